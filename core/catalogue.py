@@ -1,0 +1,164 @@
+"""ONE table of all techniques; interface, command, tests and documentation are derived from it.
+
+A technique is one file in each core and one row here. The row's `module` names
+that file below ``core/pure`` and ``core/fast``; its `structure` is the class in it.
+A module is imported when its technique is first built, not before.
+"""
+
+import time
+from dataclasses import dataclass
+from importlib import import_module
+
+from .errors import ParameterError
+from .parameters import Parameter, did_you_mean, resolve
+
+CORES = ("pure", "fast")
+ALL_RAYS = ("primary", "secondary", "shadow")
+
+
+@dataclass(frozen=True)
+class Technique:
+    """One row of the catalogue.
+
+    Parameters
+    ----------
+    name, label : str
+        The fixed name, and the name as the interface shows it.
+    family : str
+        The folder, or ``peers``.
+    module, structure : str
+        File below a core's folder (``hierarchies.bvh``) and the class in it.
+    source : str
+        Paper or book section.
+    help : str
+        One line: what the method does.
+    rays : tuple of str
+        The kinds of ray it serves: primary, secondary, shadow.
+    primitives : str
+        ``all``, or the only kind it takes.
+    parameters : tuple of Parameter
+    cores : tuple of str
+    """
+
+    name: str
+    label: str
+    family: str
+    module: str
+    structure: str
+    source: str
+    help: str
+    rays: tuple = ALL_RAYS
+    primitives: str = "all"
+    parameters: tuple = ()
+    cores: tuple = CORES
+
+    def load(self, core):
+        """Import the technique's module in one core and return its class."""
+        folder = "peers" if self.family == "peers" else core
+        module = import_module(f".{folder}.{self.module}", __package__)
+        return getattr(module, self.structure)
+
+
+LEAF_SIZE = Parameter("leaf_size", 2, "A leaf holds at most this many primitives where it can be divided",
+                      low=1, high=1024)
+
+TECHNIQUES = (
+    Technique("brute", "Brute Force", "hierarchies", "brute", "Brute",
+              "Whitted 1980", "Every ray is tested against every primitive"),
+    Technique("bvh", "Bounding Volume Hierarchy", "hierarchies", "bvh", "BVH",
+              "Goldsmith and Salmon 1987; Wald 2007; Meister and Bittner 2018",
+              "A tree of axis-aligned boxes around the primitives",
+              parameters=(
+                  Parameter("builder", {"pure": "sah", "fast": "ploc"}, "How the tree is built",
+                            choices=("sah", "ploc"), only=(("ploc", "fast"),)),
+                  Parameter("leaf_size", {"pure": 2, "fast": 1},
+                            "A leaf holds at most this many primitives where it can be divided", low=1, high=1024),
+              )),
+    Technique("grid", "Uniform Grid", "subdivision", "grid", "Grid",
+              "Fujimoto et al. 1986; Amanatides and Woo 1987",
+              "Equal cells, walked with a 3D digital differential analyser",
+              parameters=(
+                  Parameter("walk", "exact", "How the planes' parameters are advanced",
+                            choices=("subtract", "add", "exact")),
+                  Parameter("density", 4.0, "Cells per primitive", low=1e-3, high=1000.0),
+                  Parameter("resolution", 0, "Cells along the longest axis; 0 means by density", low=0, high=4096),
+              )),
+    Technique("octree", "Octree", "subdivision", "octree", "Octree",
+              "Glassner 1984; Samet 2006",
+              "Cells halved along all three axes at once",
+              parameters=(
+                  Parameter("max_depth", 8, "Levels below the root, at most (K)", low=0, high=21),
+                  Parameter("leaf_size", 8, "A cell with more primitives (M) is divided", low=1, high=1024),
+              )),
+    Technique("embree", "Embree", "peers", "embree", "Embree",
+              "Wald et al. 2014", "Intel's ray tracing kernels, through the package embreex",
+              primitives="triangle", cores=("fast",)),
+    Technique("mathutils", "Blender BVHTree", "peers", "mathutils_bvh", "MathutilsBVH",
+              "Blender's mathutils.bvhtree", "Blender's own tree, one ray at a time from Python",
+              primitives="triangle", cores=("fast",)),
+)
+
+_BY_NAME = {t.name: t for t in TECHNIQUES}
+
+
+def techniques():
+    """All techniques.
+
+    Returns
+    -------
+    list of Technique
+        In the catalogue's order.
+    """
+    return list(TECHNIQUES)
+
+
+def technique(name):
+    """The row of one technique.
+
+    Raises
+    ------
+    ParameterError
+        For an unknown name; the message lists the known ones.
+    """
+    if name not in _BY_NAME:
+        raise ParameterError(f"There is no technique {name!r}{did_you_mean(name, _BY_NAME)}. "
+                             f"Techniques: {', '.join(_BY_NAME)}.")
+    return _BY_NAME[name]
+
+
+def build(scene, name="bvh", core="fast", progress=None, **parameters):
+    """Build one technique over a scene.
+
+    Parameters
+    ----------
+    scene : Scene
+    name : str
+        A technique's name, see :func:`techniques`.
+    core : {"fast", "pure"}
+    progress : callable, optional
+        Called as ``progress(fraction)`` now and then; it stops the build by raising
+        :class:`~rayscope.core.errors.Cancelled`.
+    **parameters
+        The technique's own.
+
+    Returns
+    -------
+    Structure
+        With ``closest``, ``occluded``, ``cells``, ``figures``.
+
+    Raises
+    ------
+    ParameterError
+        For unknown names and bad values.
+    MemoryEstimateError
+        When the structure would not fit into memory.
+    """
+    row = technique(name)
+    if core not in row.cores:
+        raise ParameterError(f"{name} has no core {core!r}. It has: {', '.join(row.cores)}.")
+    values = resolve(name, row.parameters, parameters, core)
+    structure = row.load(core)
+    start = time.perf_counter()
+    index = structure.over(scene, row, values, progress)
+    index.figures["T_B"] = time.perf_counter() - start
+    return index

@@ -1,0 +1,1 @@
+"""The numpy core: every technique on batches of rays."""

@@ -1,0 +1,104 @@
+"""What is asked along a batch of rays: the nearest hit, or any hit.
+
+A structure's ``traverse`` only finds (ray, primitive) pairs worth testing and hands them to ``query.test``. It may
+skip whatever lies beyond ``query.t`` of its ray; the query shortens that as hits are found (to minus infinity when
+any hit will do), so one traversal serves both questions.
+"""
+
+import numpy as np
+
+
+class Counts:
+    """Counters of a batch, one value a ray."""
+
+    def __init__(self, n):
+        self.n_it, self.n_ts, self.n_ets, self.n_eets = (np.zeros(n, np.int64) for _ in range(4))
+
+    def tests(self, ray):
+        """Count one intersection test for every entry of `ray`."""
+        self.n_it += np.bincount(ray, minlength=len(self.n_it))
+
+    def steps(self, ray, leaf=None, empty=None):
+        """Count one traversal step for every entry of `ray`; `leaf` and `empty` say which were elementary, which empty."""
+        n = len(self.n_ts)
+        self.n_ts += np.bincount(ray, minlength=n)
+        if leaf is not None:
+            self.n_ets += np.bincount(ray[leaf], minlength=n)
+        if empty is not None:
+            self.n_eets += np.bincount(ray[empty], minlength=n)
+
+
+class Closest:
+    """The nearest hit of every ray; of hits at the same t the one with the lowest number.
+
+    Attributes
+    ----------
+    t : ndarray, shape (n,), float64
+        Far end of what still matters: the nearest hit so far, at first t_max. Traversals read it.
+    item : ndarray, shape (n,), int64
+        Primitive hit, -1 for none.
+    u, v : ndarray, shape (n,)
+    detail : ndarray, shape (n,), int64
+        What the primitive's kind needs to describe the hit: triangle of an instance, leaf of a CSG tree.
+    counts : Counts or None
+    """
+
+    def __init__(self, primitives, rays, counts=None):
+        self.primitives, self.rays, self.counts = primitives, rays, counts
+        self.t = rays.t_max.copy()
+        self.item = np.full(rays.n, -1, np.int64)
+        self.u, self.v = np.zeros(rays.n), np.zeros(rays.n)
+        self.detail = np.zeros(rays.n, np.int64)
+
+    def test(self, ray, item):
+        """Test pairs of rays and primitives (numbers in the batch, numbers in the set); keep the nearest hits."""
+        if self.counts:
+            self.counts.tests(ray)
+        pair, t, u, v, detail = self.primitives.intersect(self.rays, ray, item, self.t)
+        self.keep(ray[pair], item[pair], t, u, v, detail)
+
+    def keep(self, ray, item, t, u, v, detail):
+        """Take over hits found elsewhere; several may belong to one ray."""
+        old_t, old_item = self.t[ray], self.item[ray]
+        # A hit at t_max itself counts, hence <= while there is no hit yet.
+        better = np.flatnonzero((t < old_t) | ((t == old_t) & ((old_item < 0) | (item < old_item))))
+        if not len(better):
+            return
+        ray, item, t = ray[better], item[better], t[better]
+        # Sorted so that a ray's best hit comes first: unique then keeps it.
+        order = np.lexsort((item, t, ray))
+        first = np.ones(len(order), bool)
+        first[1:] = ray[order[1:]] != ray[order[:-1]]
+        best = order[first]
+        r = ray[best]
+        self.t[r], self.item[r] = t[best], item[best]
+        best = better[best]
+        self.u[r], self.v[r], self.detail[r] = u[best], v[best], detail[best]
+
+
+class Occluded:
+    """Whether anything lies between t_min and t_max of every ray.
+
+    Attributes
+    ----------
+    t : ndarray, shape (n,)
+        t_max, or minus infinity once the ray is known to be blocked.
+    blocked : ndarray, shape (n,), bool
+    """
+
+    def __init__(self, primitives, rays, counts=None):
+        self.primitives, self.rays, self.counts = primitives, rays, counts
+        self.t = rays.t_max.copy()
+        self.blocked = np.zeros(rays.n, bool)
+
+    def test(self, ray, item):
+        """Test pairs of rays and primitives."""
+        if self.counts:
+            self.counts.tests(ray)
+        pair = self.primitives.blocks(self.rays, ray, item, self.t)
+        self.keep(ray[pair])
+
+    def keep(self, ray, *_):
+        """These rays are blocked."""
+        self.blocked[ray] = True
+        self.t[ray] = -np.inf

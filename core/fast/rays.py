@@ -1,0 +1,101 @@
+"""A batch of rays, as columns."""
+
+from functools import cached_property
+
+import numpy as np
+
+
+class Rays:
+    """n rays, checked and scaled for tracing.
+
+    A direction is scaled by a power of two, so that its largest component lies in [1, 2): exact, and it keeps
+    reciprocals and products far from overflow. `t` inside the core is in multiples of the scaled direction.
+
+    Attributes
+    ----------
+    n : int
+    o, d : ndarray, shape (3, n), float64
+        Origins and scaled directions.
+    t_min, t_max : ndarray, shape (n,)
+    exponent : ndarray, shape (n,), int
+        The scaled direction times 2**exponent is the caller's.
+    """
+
+    def __init__(self, o, d, t_min, t_max, exponent=None):
+        self.n = o.shape[1]
+        self.o, self.d, self.t_min, self.t_max, self.exponent = o, d, t_min, t_max, exponent
+
+    @classmethod
+    def checked(cls, origins, directions, t_min, t_max):
+        """Rays from what a caller gave, and which of them can hit anything.
+
+        Returns
+        -------
+        rays : Rays
+            The usable ones.
+        index : ndarray
+            Their positions in the input. A ray with a NaN, infinite or zero direction, a NaN or infinite origin, or
+            an empty interval is not among them: it misses.
+
+        Raises
+        ------
+        ValueError
+            For wrong shapes.
+        """
+        origins, directions = _columns(origins, "origins"), _columns(directions, "directions")
+        n = origins.shape[1]
+        if directions.shape[1] != n:
+            raise ValueError(f"{n} origins but {directions.shape[1]} directions.")
+        t_min, t_max = (np.broadcast_to(np.asarray(t, float), (n,)) for t in (t_min, t_max))
+        largest = np.abs(directions).max(axis=0, initial=0.0)
+        usable = np.isfinite(origins).all(axis=0) & np.isfinite(largest) & (largest > 0.0) & (t_min <= t_max)
+        index = np.flatnonzero(usable)
+        exponent = np.frexp(largest[index])[1] - 1
+        d = np.ldexp(directions[:, index], -exponent)
+        return cls(origins[:, index], d, np.ldexp(t_min[index], exponent), np.ldexp(t_max[index], exponent), exponent), index
+
+    def take(self, index):
+        """Some of the rays; `index` is an array or a slice."""
+        return Rays(self.o[:, index], self.d[:, index], self.t_min[index], self.t_max[index],
+                    None if self.exponent is None else self.exponent[index])
+
+    def callers_t(self, t):
+        """t in multiples of the caller's directions."""
+        return np.ldexp(t, -self.exponent)
+
+    @cached_property
+    def inverse(self):
+        """1 / d, shape (3, n); infinite, with the component's sign, where it is zero."""
+        with np.errstate(divide="ignore"):
+            return 1.0 / self.d
+
+    @cached_property
+    def shear(self):
+        """Constants of the watertight triangle test (Woop, Benthin and Wald 2013, section 3.1).
+
+        Returns
+        -------
+        axes : ndarray, shape (3, n), int64
+            kx, ky, kz: kz is the direction's largest component; kx and ky are swapped where it is negative.
+        origin : ndarray, shape (3, n)
+            Origins in the order of `axes`.
+        s : ndarray, shape (3, n)
+            Sx, Sy, Sz.
+        """
+        kz = np.abs(self.d).argmax(axis=0)
+        kx, ky = (kz + 1) % 3, (kz + 2) % 3
+        i = np.arange(self.n)
+        dz = self.d[kz, i]
+        kx, ky = np.where(dz < 0.0, ky, kx), np.where(dz < 0.0, kx, ky)
+        axes = np.stack([kx, ky, kz])
+        return axes, self.o[axes, i], np.stack([self.d[kx, i] / dz, self.d[ky, i] / dz, 1.0 / dz])
+
+
+def _columns(points, what):
+    """An (n, 3) array as contiguous (3, n) float64."""
+    points = np.asarray(points, float)
+    if points.size == 0:
+        return np.zeros((3, 0))
+    if points.ndim != 2 or points.shape[1] != 3:
+        raise ValueError(f"{what} have the shape (n, 3), not {points.shape}.")
+    return np.ascontiguousarray(points.T)

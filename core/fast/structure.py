@@ -1,0 +1,138 @@
+"""What all structures of the numpy core share: building over a scene, and answering batches of rays."""
+
+import math
+
+import numpy as np
+
+from ..hits import Cells, Hits
+from .primitives import Primitives
+from .query import Closest, Counts, Occluded
+from .rays import Rays
+
+#: Rays traced at a time: enough to amortise numpy's calls, few enough for the caches.
+BATCH = 131_072
+
+
+def no_progress(fraction):
+    """Progress nobody listens to."""
+
+
+class Structure:
+    """Base of all techniques of the numpy core.
+
+    A technique overrides three methods: :meth:`build` (over ``self.primitives``, never empty), :meth:`traverse`
+    and :meth:`cells`.
+
+    Attributes
+    ----------
+    primitives : Primitives
+    parameters : dict
+    figures : dict
+        Filled by :meth:`build`: N_G, N_E, N_EE, N_ER, depth, memory, c_SAH, as far as they make sense.
+    """
+
+    def __init__(self, primitives, parameters, progress=None):
+        self.primitives, self.parameters = primitives, parameters
+        self.figures = {"N": primitives.n, "memory": 0}
+        if primitives.n:
+            self.build(progress or no_progress, **parameters)
+            self.figures["memory"] += sum(s.figures["memory"] for s in primitives.structures())
+
+    @classmethod
+    def over(cls, scene, row, parameters, progress=None):
+        """Build over a scene; `row` is the technique's row in the catalogue."""
+        primitives = Primitives.of(scene, lambda geometry: cls(geometry, parameters, progress))
+        index = cls(primitives, parameters, progress)
+        index.scene, index.technique = scene, row
+        return index
+
+    def build(self, progress, **parameters):
+        """Build over ``self.primitives`` and fill in ``self.figures``."""
+        raise NotImplementedError
+
+    def traverse(self, rays, query):
+        """Hand every (ray, primitive) pair that can matter to ``query.test``."""
+        raise NotImplementedError
+
+    def cells(self):
+        """The structure's boxes.
+
+        Returns
+        -------
+        Cells
+        """
+        return Cells.make([], [], [], [], [], [])
+
+    def closest(self, origins, directions, t_min=0.0, t_max=math.inf, count=False, progress=None):
+        """The nearest hit of every ray with t_min <= t <= t_max.
+
+        Parameters
+        ----------
+        origins, directions : array_like, shape (n, 3)
+            World space. Directions need not have unit length.
+        t_min, t_max : float or array_like, shape (n,)
+            In multiples of the direction.
+        count : bool
+            Also count, per ray.
+        progress : callable, optional
+            Called with the fraction done after every batch; may raise Cancelled.
+
+        Returns
+        -------
+        Hits
+        """
+        answers = self._ask(Closest, origins, directions, t_min, t_max, count, progress)
+        n, rays, index, parts, counts = answers
+        hits = Hits(t=np.full(n, np.inf), primitive=np.full(n, -1, np.int64), object=np.full(n, -1, np.int32),
+                    u=np.zeros(n), v=np.zeros(n), part=np.zeros(n, np.int32), normal=np.zeros((n, 3)),
+                    point=np.zeros((n, 3)), error=np.zeros(n), **counts)
+        for start, query in parts:
+            found = np.flatnonzero(query.item >= 0)
+            if not len(found):
+                continue
+            at = index[start + found]
+            batch = query.rays.take(found)
+            surface = self.primitives.surface(batch, query.item[found], query.t[found], query.u[found], query.v[found],
+                                              query.detail[found])
+            hits.t[at] = batch.callers_t(query.t[found])
+            hits.u[at], hits.v[at] = query.u[found], query.v[found]
+            (hits.object[at], hits.primitive[at], hits.part[at], hits.normal[at], hits.point[at], hits.error[at]) = surface
+        return hits
+
+    def occluded(self, origins, directions, t_min=0.0, t_max=math.inf, count=False, progress=None):
+        """Whether anything lies at t_min <= t <= t_max.
+
+        Parameters
+        ----------
+        origins, directions, t_min, t_max, progress
+            As for :meth:`closest`.
+        count : bool
+            Also return the counts.
+
+        Returns
+        -------
+        ndarray of bool, shape (n,), or (ndarray, dict of ndarray) with the counts n_it, n_ts, n_ets, n_eets
+        """
+        n, rays, index, parts, counts = self._ask(Occluded, origins, directions, t_min, t_max, count, progress)
+        blocked = np.zeros(n, bool)
+        for start, query in parts:
+            blocked[index[start + np.flatnonzero(query.blocked)]] = True
+        return (blocked, counts) if count else blocked
+
+    def _ask(self, question, origins, directions, t_min, t_max, count, progress):
+        """Put a question to all rays, batch by batch."""
+        n = len(origins)
+        rays, index = Rays.checked(origins, directions, t_min, t_max)
+        names = ("n_it", "n_ts", "n_ets", "n_eets")
+        counts = {name: np.zeros(n, np.int64) for name in names} if count else {}
+        parts = []
+        for start in range(0, rays.n if self.primitives.n else 0, BATCH):
+            batch = rays.take(slice(start, start + BATCH)) if rays.n > BATCH else rays
+            query = question(self.primitives, batch, Counts(batch.n) if count else None)
+            self.traverse(batch, query)
+            for name in counts:
+                counts[name][index[start:start + batch.n]] = getattr(query.counts, name)
+            parts.append((start, query))
+            if progress:
+                progress(min(1.0, (start + batch.n) / rays.n))
+        return n, rays, index, parts, counts

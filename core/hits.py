@@ -1,0 +1,101 @@
+"""What a structure answers: hits, and the cells it consists of."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+
+@dataclass
+class Hits:
+    """The nearest hits of n rays; every array has length n.
+
+    Attributes
+    ----------
+    t : float64
+        Distance in multiples of the direction, inf for a miss.
+    primitive : int64
+        The primitive's index in its own object (triangle of the mesh, solid of the list), -1 for a miss.
+    object : int32
+        Index of the object in the scene, -1 for a miss.
+    u, v : float64
+        Triangles: barycentric weights of the second and third vertex. Others: their surface parameters.
+    part : int32
+        The leaf of a CSG tree whose surface was met; 0 otherwise.
+    normal : float64, shape (n, 3)
+        Unit geometric normal (of a triangle: by its winding, after the object's matrix), 0 for a miss.
+    point : float64, shape (n, 3)
+        The hit point, computed from the primitive rather than from t.
+    error : float64
+        Bound on the distance between `point` and the true surface, per coordinate axis.
+    n_it, n_ts, n_ets, n_eets : int64, or None
+        Counts per ray, where ``count=True`` asked for them.
+    """
+
+    t: np.ndarray
+    primitive: np.ndarray
+    object: np.ndarray
+    u: np.ndarray
+    v: np.ndarray
+    part: np.ndarray
+    normal: np.ndarray
+    point: np.ndarray
+    error: np.ndarray
+    n_it: np.ndarray | None = None
+    n_ts: np.ndarray | None = None
+    n_ets: np.ndarray | None = None
+    n_eets: np.ndarray | None = None
+
+    def __len__(self):
+        return len(self.t)
+
+    @property
+    def hit(self):
+        """Bool per ray: whether it met anything."""
+        return np.asarray(self.primitive) >= 0
+
+
+@dataclass
+class Cells:
+    """The boxes of a structure, as an overlay draws them; every array has length c.
+
+    Attributes
+    ----------
+    lo, hi : float64, shape (c, 3)
+        Corners in world space.
+    level : int32
+        0 at the root.
+    count : int32
+        References to primitives in the cell itself (leaves), or below it (inner nodes).
+    leaf : bool
+    cost : float64
+        Expected tests for a random ray that meets the root: area / root area x count for leaves, area / root area for inner nodes.
+    parent : int64
+        Index of the cell above, -1 at the root.
+    """
+
+    lo: np.ndarray
+    hi: np.ndarray
+    level: np.ndarray
+    count: np.ndarray
+    leaf: np.ndarray
+    cost: np.ndarray
+    parent: np.ndarray
+
+    def __len__(self):
+        return len(self.lo)
+
+    @classmethod
+    def make(cls, lo, hi, level, count, leaf, parent):
+        """Cells from their boxes; the cost is computed here."""
+        lo, hi = np.asarray(lo, float).reshape(-1, 3), np.asarray(hi, float).reshape(-1, 3)
+        count, leaf = np.asarray(count, np.int32), np.asarray(leaf, bool)
+        area = box_area(lo, hi)
+        root = area[0] if len(area) and area[0] > 0 else 1.0
+        return cls(lo, hi, np.asarray(level, np.int32), count, leaf,
+                   area / root * np.where(leaf, count, 1), np.asarray(parent, np.int64))
+
+
+def box_area(lo, hi):
+    """Surface areas of boxes, shape (n,); 0 for empty ones."""
+    x, y, z = np.maximum(np.asarray(hi) - np.asarray(lo), 0.0).T
+    return 2.0 * (x * y + y * z + z * x)

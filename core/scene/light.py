@@ -1,0 +1,48 @@
+"""Lights, in Blender's units: watts for point, spot and area, watts per square metre for the sun."""
+
+from dataclasses import dataclass
+
+
+@dataclass
+class Light:
+    """One light.
+
+    `colour` is what its kind radiates, so that Blender's power P becomes: point and spot P / (4 pi) (radiant
+    intensity), sun P (irradiance), area P / (pi A) (radiance).
+
+    Parameters
+    ----------
+    name : str
+    kind : {"point", "sun", "spot", "area"}
+    colour : tuple of float
+        Linear RGB.
+    position : tuple of float
+        World space; unused by the sun.
+    direction : tuple of float
+        Unit vector along which sun, spot and area lights shine.
+    radius : float
+        Point and spot: of the luminous sphere. Sun: tangent of half its angular diameter. 0 gives hard shadows.
+    spot_angle : float
+        Full opening angle of the cone, radians.
+    spot_blend : float
+        Share of the cone, 0 to 1, over which the edge fades: Blender's spot blend.
+    axes : tuple of two triples, optional
+        Area: the half-edges of the rectangle, or half-axes of the ellipse, world space.
+    shape : {"rectangle", "ellipse"}
+    falloff : bool
+        False: intensity does not decrease with distance (NFF lights).
+    shadows : bool
+    """
+
+    name: str
+    kind: str
+    colour: tuple
+    position: tuple = (0.0, 0.0, 0.0)
+    direction: tuple = (0.0, 0.0, -1.0)
+    radius: float = 0.0
+    spot_angle: float = 0.7853981633974483
+    spot_blend: float = 0.0
+    axes: tuple | None = None
+    shape: str = "rectangle"
+    falloff: bool = True
+    shadows: bool = True

@@ -1,0 +1,147 @@
+"""Materials: Whitted's coefficients, and how Blender's Principled BSDF becomes them.
+
+The mapping, for metallic m, roughness r, transmission w, specular level s, index of
+refraction ior, base colour C; F0 = min(1, 2 s ((ior - 1) / (ior + 1))^2), and the gloss
+g = max(0, 1 - 2 r) says how much of the reflection is sharp enough to be a mirror:
+
+============  =========================================================================
+coefficient   value
+============  =========================================================================
+diffuse       (1 - m) (1 - w) C
+ambient       diffuse + m (1 - g) C: what a rough metal would reflect of the surroundings
+shininess n   2 / r^4 - 2, at most 4096 (Blinn-Phong exponent of a microfacet lobe of width r^2)
+specular      (F0 (1 - m) + m C) (n + 8) / 8, at most 64 (the lobe's normalisation)
+mirror        g ((1 - m) Fresnel(F0) + m C); Fresnel is the dielectric's reflectance, and 1 at
+              grazing incidence
+transmission  (1 - m) w C, times 1 - Fresnel
+emission      emission colour times strength
+alpha         alpha; the rest of the ray goes straight on
+============  =========================================================================
+
+Light arriving with irradiance E leaves as radiance (diffuse (N.L) + specular (N.H)^n) E / pi.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+
+@dataclass
+class Image:
+    """A picture used as texture or surroundings.
+
+    Parameters
+    ----------
+    name : str
+    pixels : ndarray, shape (height, width, 4)
+        Linear float32 RGBA, row 0 at the bottom.
+    interpolation : {"linear", "closest"}
+    extension : {"repeat", "extend", "clip"}
+        What lies outside [0, 1].
+    """
+
+    name: str
+    pixels: np.ndarray
+    interpolation: str = "linear"
+    extension: str = "repeat"
+
+
+@dataclass
+class Material:
+    """Whitted's coefficients of a surface.
+
+    The base colour is `base`, times the texture and the vertex colours where there are any.
+    Colours are linear RGB triples.
+
+    Parameters
+    ----------
+    name : str
+    base : tuple of float
+    texture : Image, optional
+    vertex_colours : bool
+        Multiply the base colour by the mesh's colour attribute.
+    ambient, diffuse : float
+        Times the base colour.
+    specular, specular_base : float
+        Highlight: `specular` white plus `specular_base` times the base colour.
+    shininess : float
+        Blinn-Phong exponent.
+    mirror, mirror_base : float
+        Mirror reflection: `mirror` white plus `mirror_base` times the base colour.
+    transmission : float
+        Refracted light, times the base colour.
+    ior : float
+        Index of refraction.
+    fresnel : bool
+        Dielectric Fresnel equations share out `mirror` and `transmission` by angle; without, they are constants.
+    emission : tuple of float
+    alpha : float
+    """
+
+    name: str = "Material"
+    base: tuple = (0.8, 0.8, 0.8)
+    texture: Image | None = None
+    vertex_colours: bool = False
+    ambient: float = 1.0
+    diffuse: float = 1.0
+    specular: float = 0.0
+    specular_base: float = 0.0
+    shininess: float = 1.0
+    mirror: float = 0.0
+    mirror_base: float = 0.0
+    transmission: float = 0.0
+    ior: float = 1.45
+    fresnel: bool = False
+    emission: tuple = (0.0, 0.0, 0.0)
+    alpha: float = 1.0
+
+    @classmethod
+    def principled(cls, name, base=(0.8, 0.8, 0.8), metallic=0.0, roughness=0.5, ior=1.5, alpha=1.0,
+                   transmission=0.0, specular_level=0.5, emission=(0.0, 0.0, 0.0), **more):
+        """The material for a Principled BSDF; see the table at the top of this file."""
+        dielectric = 1.0 - metallic
+        reflectance = min(1.0, 2.0 * specular_level * ((ior - 1.0) / (ior + 1.0)) ** 2)
+        gloss = max(0.0, 1.0 - 2.0 * roughness)
+        shininess = min(4096.0, max(0.0, 2.0 / max(roughness, 1e-3) ** 4 - 2.0))
+        lobe = min(64.0, (shininess + 8.0) / 8.0)
+        diffuse = dielectric * (1.0 - transmission)
+        # Below a thousandth a reflection changes no 8-bit pixel; leaving it out saves its rays.
+        mirror = dielectric * gloss if reflectance > 1e-3 or transmission > 0.0 else 0.0
+        return cls(name, base=tuple(base), ambient=diffuse + metallic * (1.0 - gloss), diffuse=diffuse,
+                   specular=reflectance * dielectric * lobe, specular_base=metallic * lobe, shininess=shininess,
+                   mirror=mirror, mirror_base=metallic * gloss, transmission=dielectric * transmission,
+                   ior=ior, fresnel=True, emission=tuple(emission), alpha=alpha, **more)
+
+
+@dataclass
+class World:
+    """What a ray sees that meets nothing, and the ambient light.
+
+    Parameters
+    ----------
+    colour : tuple of float
+        Radiance of the surroundings; also the ambient light.
+    image : Image, optional
+        Equirectangular picture of the surroundings, multiplied by `colour`; its mean is then the ambient light.
+    rotation : ndarray, shape (3, 3)
+        Takes a world direction to the picture's.
+    ambient : tuple of float, optional
+        Ambient radiance where it is not that of the surroundings.
+    """
+
+    colour: tuple = (0.05, 0.05, 0.05)
+    image: Image | None = None
+    rotation: np.ndarray | None = None
+    ambient: tuple | None = None
+
+    def ambient_light(self):
+        """RGB radiance of the ambient light."""
+        if self.ambient is not None:
+            return tuple(self.ambient)
+        if self.image is None:
+            return tuple(self.colour)
+        # Rows of an equirectangular picture cover less of the sphere towards the poles.
+        pixels = self.image.pixels
+        weight = np.sin((np.arange(len(pixels)) + 0.5) / len(pixels) * np.pi)
+        mean = (pixels[..., :3].mean(axis=1) * weight[:, None]).sum(axis=0) / weight.sum()
+        return tuple((mean * np.asarray(self.colour)).tolist())
