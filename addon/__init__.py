@@ -1,0 +1,9 @@
+"""Everything that knows Blender."""
+
+
+def register():
+    pass
+
+
+def unregister():
+    pass
