@@ -1,0 +1,204 @@
+"""Triangles, with the watertight test of Woop, Benthin and Wald (2013).
+
+The test shears each triangle so that the ray runs along an axis; the three edge functions are then differences of
+two rounded products, whose sign is right or zero whatever the rounding. Neighbours see the same sheared vertices,
+so a ray cannot slip between them.
+"""
+
+import numpy as np
+
+from ...scene.layout import mirrors, to_world
+
+#: gamma(7): relative error of a point interpolated from three vertices (Pharr et al., PBR 4th ed., 6.8.5).
+GAMMA_7 = 7 * 2.0**-53 / (1 - 7 * 2.0**-53)
+
+
+class Triangles:
+    """n triangles in world space.
+
+    Attributes
+    ----------
+    xyz : ndarray, shape (9, n)
+        x, y, z of the first vertices, then of the second, then of the third.
+    object_of, primitive_of : ndarray, shape (n,)
+        Object in the scene and triangle in its mesh.
+    flip : ndarray, shape (n,), bool
+        Whether the object's matrix mirrors, so that the winding gives the inward normal.
+    """
+
+    KIND = "triangle"
+
+    def __init__(self, xyz, object_of, primitive_of, flip):
+        self.xyz, self.object_of, self.primitive_of, self.flip = xyz, object_of, primitive_of, flip
+        self.n = xyz.shape[1]
+        self._flat = xyz.ravel()
+
+    @classmethod
+    def of(cls, objects, which):
+        """The usable triangles of some objects, copied into world space."""
+        columns, object_of, primitive_of, flip = [], [], [], []
+        for i in which:
+            mesh, matrix = objects[i].geometry, objects[i].matrix
+            world = to_world(matrix, mesh.vertices).T
+            used = np.flatnonzero(mesh.usable & np.isfinite(world).all(axis=0)[mesh.triangles].all(axis=1))
+            corners = mesh.triangles if len(used) == len(mesh) else mesh.triangles[used]
+            columns.append(np.stack([world[axis].take(corners[:, k]) for k in range(3) for axis in range(3)]))
+            object_of.append(np.full(len(used), i, np.int32))
+            primitive_of.append(used)
+            flip.append(np.full(len(used), mirrors(matrix)))
+        if not columns:
+            return cls(np.zeros((9, 0)), np.zeros(0, np.int32), np.zeros(0, np.int64), np.zeros(0, bool))
+        return cls(np.concatenate(columns, axis=1), *(np.concatenate(c) for c in (object_of, primitive_of, flip)))
+
+    def bounds(self):
+        """World boxes (lo, hi), each of shape (n, 3)."""
+        a, b, c = self.xyz[0:3], self.xyz[3:6], self.xyz[6:9]
+        return np.minimum(np.minimum(a, b), c).T, np.maximum(np.maximum(a, b), c).T
+
+    def intersect(self, rays, ray, item, t_far):
+        """Nearest hits of pairs; see the package's interface."""
+        axes, origin, s = rays.shear
+        flat, n = self._flat, self.n
+        kx, ky, kz = (axes[a].take(ray) * n + item for a in range(3))
+        ox, oy, oz = (origin[a].take(ray) for a in range(3))
+        sx, sy = s[0].take(ray), s[1].take(ray)
+        x, y, z = [], [], []
+        for vertex in range(3):
+            w = flat.take(kz)
+            w -= oz
+            p = flat.take(kx)
+            p -= ox
+            p -= sx * w
+            q = flat.take(ky)
+            q -= oy
+            q -= sy * w
+            x.append(p)
+            y.append(q)
+            z.append(w)
+            if vertex < 2:
+                kx += 3 * n
+                ky += 3 * n
+                kz += 3 * n
+        u = x[2] * y[1] - y[2] * x[1]
+        v = x[0] * y[2] - y[0] * x[2]
+        w = x[1] * y[0] - y[1] * x[0]
+        # All of one sign, zeros allowed.
+        pair = np.flatnonzero((np.minimum(np.minimum(u, v), w) >= 0.0) | (np.maximum(np.maximum(u, v), w) <= 0.0))
+        u, v, w, hit_ray = u[pair], v[pair], w[pair], ray[pair]
+        sz = s[2].take(hit_ray)
+        det = u + v + w
+        with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+            t = (u * (sz * z[0][pair]) + v * (sz * z[1][pair]) + w * (sz * z[2][pair])) / det
+        # det = 0: seen edge-on (t is then NaN or infinite).
+        good = np.flatnonzero((det != 0.0) & (t >= rays.t_min.take(hit_ray)) & (t <= t_far.take(hit_ray)) & np.isfinite(t))
+        pair, det = pair[good], det[good]
+        return pair, t[good], v[good] / det, w[good] / det, np.zeros(len(pair), np.int64)
+
+    def surface(self, rays, item, t, u, v, detail):
+        """Object, primitive, part, normal, point and error of hits."""
+        xyz = self.xyz[:, item]
+        normal = self.normals(item)
+        a, b, c = (1.0 - u - v) * xyz[0:3], u * xyz[3:6], v * xyz[6:9]
+        point = a + b + c
+        error = GAMMA_7 * (np.abs(a) + np.abs(b) + np.abs(c)).max(axis=0)
+        return self.object_of[item], self.primitive_of[item], np.zeros(len(item), np.int32), normal, point.T, error
+
+    def normals(self, item):
+        """Unit normals, shape (m, 3), outward by winding and object matrix; 0 for triangles without area."""
+        xyz = self.xyz[:, item]
+        # Scaled first, or the cross product of tiny edges underflows.
+        e, f = xyz[3:6] - xyz[0:3], xyz[6:9] - xyz[0:3]
+        scale = np.maximum(np.abs(e).max(axis=0), np.abs(f).max(axis=0))
+        scale[scale == 0.0] = 1.0
+        e, f = e / scale, f / scale
+        normal = np.stack([e[1] * f[2] - e[2] * f[1], e[2] * f[0] - e[0] * f[2], e[0] * f[1] - e[1] * f[0]])
+        length = np.sqrt(normal[0] * normal[0] + normal[1] * normal[1] + normal[2] * normal[2])
+        length[length == 0.0] = 1.0
+        length[self.flip[item]] *= -1.0
+        return (normal / length).T
+
+    def overlaps(self, item, lo, hi):
+        """Bool per pair: whether the triangle touches the box (Akenine-Moller 2001: 13 separating axes)."""
+        xyz = self.xyz[:, item]
+        lo, hi = lo.T, hi.T
+        centre, half = 0.5 * (lo + hi), 0.5 * (hi - lo)
+        v = [xyz[3 * k:3 * k + 3] - centre for k in range(3)]
+        # Rounding bound: a separation smaller than this is none.
+        size = np.abs(centre) + half
+        for p in v:
+            size = np.maximum(size, np.abs(p))
+        slack = 16 * 2.0**-53 * size.max(axis=0)
+        edges = [v[1] - v[0], v[2] - v[1], v[0] - v[2]]
+        inside = np.ones(len(item), bool)
+        for a in range(3):
+            least, most = (f(f(v[0][a], v[1][a]), v[2][a]) for f in (np.minimum, np.maximum))
+            inside &= (least <= half[a] + slack) & (most >= -half[a] - slack)
+        n = (edges[0][1] * edges[1][2] - edges[0][2] * edges[1][1],
+             edges[0][2] * edges[1][0] - edges[0][0] * edges[1][2],
+             edges[0][0] * edges[1][1] - edges[0][1] * edges[1][0])
+        reach = sum(np.abs(n[a]) * half[a] for a in range(3))
+        distance = np.abs(sum(n[a] * v[0][a] for a in range(3)))
+        size = size.max(axis=0) * np.abs(edges[0]).max(axis=0) * np.abs(edges[1]).max(axis=0)
+        inside &= distance <= reach + 128 * 2.0**-53 * size
+        for e in edges:
+            for a in range(3):
+                b, c = (a + 1) % 3, (a + 2) % 3
+                # Axis = unit vector a x edge: (0, -e_c, e_b) in the order (a, b, c).
+                p = [e[b] * q[c] - e[c] * q[b] for q in v]
+                reach = half[b] * np.abs(e[c]) + half[c] * np.abs(e[b])
+                slack_e = 4 * slack * (np.abs(e[b]) + np.abs(e[c]))
+                least, most = (f(f(p[0], p[1]), p[2]) for f in (np.minimum, np.maximum))
+                inside &= (least <= reach + slack_e) & (most >= -reach - slack_e)
+        return inside
+
+    def clip(self, item, lo, hi):
+        """Boxes of the parts of triangles inside boxes (Sutherland and Hodgman 1974), all pairs at once."""
+        m = len(item)
+        polygon = np.zeros((9, 3, m))
+        polygon[:3] = self.xyz[:, item].reshape(3, 3, m)
+        count = np.full(m, 3)
+        slack = 8 * 2.0**-53 * np.maximum(np.abs(lo), np.abs(hi)).max(axis=1, initial=0.0)
+        slack = np.maximum(slack, 8 * 2.0**-53 * np.abs(polygon[:3]).max(axis=(0, 1), initial=0.0))
+        for axis in range(3):
+            for sign, limit in ((1.0, lo[:, axis] - slack), (-1.0, -hi[:, axis] - slack)):
+                polygon, count = _clip_plane(polygon, count, axis, sign, limit)
+        used = (np.arange(9)[:, None] < count)[:, None, :]
+        own_lo = np.where(used, polygon, np.inf).min(axis=0).T - slack[:, None]
+        own_hi = np.where(used, polygon, -np.inf).max(axis=0).T + slack[:, None]
+        return np.maximum(own_lo, lo), np.minimum(own_hi, hi)
+
+    def support(self, item, axis):
+        """Exact extents (d, D) along the directions `axis`, shape (m, 3)."""
+        xyz = self.xyz[:, item]
+        a = axis.T
+        p = [xyz[3 * k] * a[0] + xyz[3 * k + 1] * a[1] + xyz[3 * k + 2] * a[2] for k in range(3)]
+        return np.minimum(np.minimum(p[0], p[1]), p[2]), np.maximum(np.maximum(p[0], p[1]), p[2])
+
+
+def _clip_plane(polygon, count, axis, sign, limit):
+    """Keep the parts of convex polygons with sign * x[axis] >= limit.
+
+    `polygon` is (9, 3, m) with `count` (m,) corners used; a triangle cut by six planes has at most nine.
+    """
+    corners, _, m = polygon.shape
+    out = np.zeros_like(polygon)
+    out_count = np.zeros(m, np.int64)
+    columns = np.arange(m)
+    for k in range(corners):
+        live = k < count
+        if not live.any():
+            break
+        here = polygon[k]
+        following = polygon[np.where(k + 1 < count, k + 1, 0), :, columns].T
+        d0, d1 = sign * here[axis] - limit, sign * following[axis] - limit
+        keep = np.flatnonzero(live & (d0 >= 0.0))
+        out[out_count[keep], :, keep] = here[:, keep].T
+        out_count[keep] += 1
+        cross = np.flatnonzero(live & ((d0 >= 0.0) != (d1 >= 0.0)))
+        if len(cross):
+            f = d0[cross] / (d0[cross] - d1[cross])
+            point = here[:, cross] + f * (following[:, cross] - here[:, cross])
+            point[axis] = sign * limit[cross]
+            out[out_count[cross], :, cross] = point.T
+            out_count[cross] += 1
+    return out, out_count
