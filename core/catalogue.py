@@ -25,9 +25,9 @@ class Technique:
     name, label : str
         The fixed name, and the name as the interface shows it.
     family : str
-        The folder, or ``peers``.
+        The folder below each core, or ``peers``.
     module, structure : str
-        File below a core's folder (``hierarchies.bvh``) and the class in it.
+        File in that folder, and the class in it.
     source : str
         Paper or book section.
     help : str
@@ -54,7 +54,7 @@ class Technique:
 
     def load(self, core):
         """Import the technique's module in one core and return its class."""
-        folder = "peers" if self.family == "peers" else core
+        folder = "peers" if self.family == "peers" else f"{core}.{self.family}"
         module = import_module(f".{folder}.{self.module}", __package__)
         return getattr(module, self.structure)
 
