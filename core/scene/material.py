@@ -37,13 +37,16 @@ class Image:
         Linear float32 RGBA, row 0 at the bottom.
     interpolation : {"linear", "closest"}
     extension : {"repeat", "extend", "clip"}
-        What lies outside [0, 1].
+        What lies outside [0, 1]; "clip" is black with alpha 0.
+    mapping : ndarray, shape (2, 3), optional
+        Texture coordinates are ``mapping @ (u, v, 1)``: scale, rotation and offset of a texture. Unchanged if absent.
     """
 
     name: str
     pixels: np.ndarray
     interpolation: str = "linear"
     extension: str = "repeat"
+    mapping: np.ndarray | None = None
 
 
 @dataclass
@@ -76,6 +79,9 @@ class Material:
         Dielectric Fresnel equations share out `mirror` and `transmission` by angle; without, they are constants.
     emission : tuple of float
     alpha : float
+        Share of the ray that the surface stops; emission counts with it too.
+    texture_alpha : bool
+        Multiply `alpha` by the texture's alpha channel: leaves cut out of a rectangle.
     """
 
     name: str = "Material"
@@ -94,6 +100,7 @@ class Material:
     fresnel: bool = False
     emission: tuple = (0.0, 0.0, 0.0)
     alpha: float = 1.0
+    texture_alpha: bool = False
 
     @classmethod
     def principled(cls, name, base=(0.8, 0.8, 0.8), metallic=0.0, roughness=0.5, ior=1.5, alpha=1.0,
@@ -123,6 +130,8 @@ class World:
         Radiance of the surroundings; also the ambient light.
     image : Image, optional
         Equirectangular picture of the surroundings, multiplied by `colour`; its mean is then the ambient light.
+        Direction (x, y, z) sees u = 1/2 - atan2(y, x) / (2 pi), v = 1/2 + atan2(z, hypot(x, y)) / pi, as in
+        Blender: the picture's middle lies along +x.
     rotation : ndarray, shape (3, 3)
         Takes a world direction to the picture's.
     ambient : tuple of float, optional
