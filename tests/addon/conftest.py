@@ -1,7 +1,6 @@
 """For the add-on's tests: Blender (the bpy module, or Blender itself through run_in_blender.py) with the checkout enabled as an extension.
 
-The checkout is linked into a temporary user folder, so neither the developer's preferences nor the checkout are touched. Test modules import
-`bl_ext.user_default.rayscope` and below, never `rayscope`.
+Test modules import `bl_ext.user_default.rayscope` and below, never `rayscope`.
 """
 import os
 import shutil
@@ -11,24 +10,18 @@ from pathlib import Path
 
 import pytest
 
-ROOT = Path(__file__).resolve().parents[2]
-PACKAGE = "bl_ext.user_default.rayscope"
-
-# BLENDER_USER_RESOURCES is read when bpy starts; Blender itself has started already, and run_in_blender.py's caller has set it.
+# BLENDER_USER_RESOURCES is read when Blender starts: here for the bpy module, by our caller for Blender itself.
 if "bpy" in sys.modules and "BLENDER_USER_RESOURCES" not in os.environ:
     raise pytest.UsageError("set BLENDER_USER_RESOURCES to an empty folder before starting Blender")
-os.environ.setdefault("BLENDER_USER_RESOURCES", tempfile.mkdtemp(prefix="rayscope-test-"))
-USER = Path(os.environ["BLENDER_USER_RESOURCES"])
+user_folder = os.environ.setdefault("BLENDER_USER_RESOURCES", tempfile.mkdtemp(prefix="rayscope-test-"))
 
 bpy = pytest.importorskip("bpy")
 import addon_utils  # noqa: E402
 
-link = USER / "extensions" / "user_default" / "rayscope"
-link.parent.mkdir(parents=True, exist_ok=True)
-if not link.is_symlink():
-    link.symlink_to(ROOT, target_is_directory=True)
-if addon_utils.enable(PACKAGE, default_set=True) is None:
-    raise pytest.UsageError(f"{PACKAGE} cannot be enabled: see the traceback above")
+sys.path.append(str(Path(__file__).resolve().parents[1]))
+from enable import PACKAGE, enable_checkout  # noqa: E402
+
+enable_checkout()
 
 
 @pytest.fixture
@@ -38,18 +31,18 @@ def empty_scene():
     return bpy.context.scene
 
 
+exit_status = pytest.StashKey[int]()
+
+
 def pytest_sessionfinish(session, exitstatus):
-    session.config.stash[_status] = exitstatus
+    session.config.stash[exit_status] = int(exitstatus)
 
 
 @pytest.hookimpl(trylast=True)
 def pytest_unconfigure(config):
     addon_utils.disable(PACKAGE)
-    shutil.rmtree(USER, ignore_errors=True)  # rmtree removes the link, not what it points to
+    shutil.rmtree(user_folder, ignore_errors=True)  # of a link it removes the link only
     if bpy.app.module and bpy.app.version < (5, 0):  # the bpy 4.5 module hangs at exit if a test left a class registered
         sys.stdout.flush()
         sys.stderr.flush()
-        os._exit(config.stash.get(_status, 1))
-
-
-_status = pytest.StashKey[int]()
+        os._exit(config.stash.get(exit_status, 1))

@@ -46,7 +46,7 @@ def record_draw_handlers_and_timers():
 
 def registered():
     """Everything an add-on can leave behind, as {what: set of names}."""
-    state = {"types": set(dir(bpy.types)), "handlers": set(), "properties": set(), "compatible engines": set(), "keys": set()}
+    state = {"types": set(dir(bpy.types)), "handlers": set(), "properties": set(), "compatible engines": set(), "keys": set(), "appended": set()}
     state["operators"] = {f"{group}.{name}" for group in dir(bpy.ops) for name in dir(getattr(bpy.ops, group))}
     for name in dir(bpy.app.handlers):
         found = getattr(bpy.app.handlers, name)
@@ -57,6 +57,7 @@ def registered():
         rna = getattr(cls, "bl_rna", None)
         if rna is not None and issubclass(cls, (bpy.types.ID, bpy.types.WindowManager, bpy.types.ViewLayer, bpy.types.Camera)):
             state["properties"] |= {f"{name}.{key}" for key in rna.properties.keys()}
+        state["appended"] |= {f"{name}: {function.__qualname__}" for function in getattr(getattr(cls, "draw", None), "_draw_funcs", ())}
         state["compatible engines"] |= {f"{name}: {engine}" for engine in getattr(cls, "COMPAT_ENGINES", ())}
     configurations = bpy.context.window_manager.keyconfigs
     if configurations.addon:
