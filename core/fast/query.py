@@ -18,14 +18,15 @@ class Counts:
         """Count one intersection test for every entry of `ray`."""
         self.n_it += np.bincount(ray, minlength=len(self.n_it))
 
-    def steps(self, ray, leaf=None, empty=None):
-        """Count one traversal step for every entry of `ray`; `leaf` and `empty` say which were elementary, which empty."""
-        n = len(self.n_ts)
-        self.n_ts += np.bincount(ray, minlength=n)
-        if leaf is not None:
-            self.n_ets += np.bincount(ray[leaf], minlength=n)
+    def steps(self, ray):
+        """Count one traversal step for every entry of `ray`."""
+        self.n_ts += np.bincount(ray, minlength=len(self.n_ts))
+
+    def elementary(self, ray, empty=None):
+        """Of the steps: these were elementary cells; `empty`, a mask or an index, says which of them were empty."""
+        self.n_ets += np.bincount(ray, minlength=len(self.n_ets))
         if empty is not None:
-            self.n_eets += np.bincount(ray[empty], minlength=n)
+            self.n_eets += np.bincount(ray[empty], minlength=len(self.n_eets))
 
 
 class Closest:

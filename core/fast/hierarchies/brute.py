@@ -19,7 +19,8 @@ class Brute(Structure):
     def traverse(self, rays, query):
         n = self.primitives.n
         if query.counts:
-            query.counts.steps(np.arange(rays.n), leaf=slice(None))
+            query.counts.steps(np.arange(rays.n))
+            query.counts.elementary(np.arange(rays.n))
         width = min(n, PAIRS)
         some = max(1, PAIRS // width)
         for start in range(0, rays.n, some):
