@@ -56,6 +56,11 @@ def invertible(matrix):
     return bool(np.linalg.cond(np.asarray(matrix)[:3, :3]) < 1e12)
 
 
+def inverse(matrix):
+    """The inverse of an invertible affine matrix; both cores take it from here, so that they see the same numbers."""
+    return np.linalg.inv(np.asarray(matrix, float))
+
+
 def mirrors(matrix):
     """Whether an affine matrix turns left into right."""
     return bool(np.linalg.det(np.asarray(matrix)[:3, :3]) < 0.0)
