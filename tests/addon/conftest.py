@@ -10,18 +10,20 @@ from pathlib import Path
 
 import pytest
 
-# BLENDER_USER_RESOURCES is read when Blender starts: here for the bpy module, by our caller for Blender itself.
-if "bpy" in sys.modules and "BLENDER_USER_RESOURCES" not in os.environ:
-    raise pytest.UsageError("set BLENDER_USER_RESOURCES to an empty folder before starting Blender")
-user_folder = os.environ.setdefault("BLENDER_USER_RESOURCES", tempfile.mkdtemp(prefix="rayscope-test-"))
-
-bpy = pytest.importorskip("bpy")
-import addon_utils  # noqa: E402
-
 sys.path.append(str(Path(__file__).resolve().parents[1]))
 from enable import PACKAGE, enable_checkout  # noqa: E402
 
-enable_checkout()
+# BLENDER_USER_RESOURCES is read when Blender starts: here for the bpy module, by our caller for Blender itself.
+if sys.modules.get("bpy") and "BLENDER_USER_RESOURCES" not in os.environ:
+    raise pytest.UsageError("set BLENDER_USER_RESOURCES to an empty folder before starting Blender")
+user_folder = os.environ.setdefault("BLENDER_USER_RESOURCES", tempfile.mkdtemp(prefix="rayscope-test-"))
+try:
+    import bpy
+except ImportError:
+    bpy = None
+    collect_ignore_glob = ["test_*.py"]  # nothing of the add-on can be tested without Blender
+else:
+    enable_checkout()
 
 
 @pytest.fixture
@@ -40,6 +42,10 @@ def pytest_sessionfinish(session, exitstatus):
 
 @pytest.hookimpl(trylast=True)
 def pytest_unconfigure(config):
+    if bpy is None:
+        return
+    import addon_utils
+
     addon_utils.disable(PACKAGE)
     shutil.rmtree(user_folder, ignore_errors=True)  # of a link it removes the link only
     if bpy.app.module and bpy.app.version < (5, 0):  # the bpy 4.5 module hangs at exit if a test left a class registered
