@@ -150,6 +150,12 @@ class Scene:
                 self.notices.append(Notice(names[0], f"{bad} of {len(mesh)} triangles have vertices that are NaN, infinite or beyond "
                                            f"{MAX_COORDINATE:g}; they were left out. Find the modifier that makes them, or use Mesh > Clean Up."))
 
+        if any(isinstance(o.geometry, Shapes) for o in self.objects):
+            from .solids import faults
+            for i, k, text in faults(self.objects):
+                solid = self.objects[i].geometry.solids[k]
+                self.notices.append(Notice(f"{self.objects[i].name}: {solid.name or f'solid {k}'}", f"{text}; it was left out."))
+
     def _usable(self, obj):
         """Whether an object's matrix can be used; a notice tells when not."""
         obj.matrix = np.asarray(obj.matrix, float)

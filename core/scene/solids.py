@@ -1,11 +1,60 @@
-"""Analytic solids, and combinations of them (CSG).
+"""Analytic solids: a kind (unit sphere, box, ...) under an affine matrix.
 
-A solid is a kind (unit sphere, box, ...) under an affine matrix, or an operation on two solids.
+``KINDS`` is the one table of kinds. A kind is one row here and one file in each core, which holds its arithmetic in
+the unit shape's own space. What both cores need alike (world matrices, their inverses, which solids can be used) is
+computed here once, so that both work on the same numbers.
 """
 
-from dataclasses import dataclass
+import math
+from dataclasses import dataclass, field
 
 import numpy as np
+
+from ..errors import SceneError
+
+
+@dataclass(frozen=True)
+class Kind:
+    """One kind of solid.
+
+    Parameters
+    ----------
+    name : str
+    help : str
+        The unit shape, in words.
+    hull : callable
+        Solid -> (points, discs): the unit shape is within, and touches, the convex hull of points (k, 3) and of
+        circles [(z, radius), ...] about the z axis. None for kinds that consist of their corners.
+    closed : callable
+        Solid -> bool: whether it encloses a volume.
+    """
+
+    name: str
+    help: str
+    hull: object = None
+    closed: object = lambda solid: True
+
+
+_SQUARE = [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)]
+BOX_CORNERS = [(x, y, z) for z in (-1.0, 1.0) for x, y in _SQUARE]
+PYRAMID_CORNERS = [(x, y, 0.0) for x, y in _SQUARE] + [(0.0, 0.0, 1.0)]
+
+KINDS = {k.name: k for k in (
+    Kind("sphere", "the unit sphere about the origin"),
+    Kind("box", "the cube from (-1, -1, -1) to (1, 1, 1)", lambda s: (BOX_CORNERS, [])),
+    Kind("cylinder", "radius 1 about z, from z = 0 to 1; values: capped", lambda s: ([], [(0.0, 1.0), (1.0, 1.0)]),
+         lambda s: s.values["capped"]),
+    Kind("cone", "radius 1 at z = 0, `ratio` at z = 1; values: ratio, capped",
+         lambda s: ([], [(0.0, 1.0), (1.0, s.values["ratio"])]), lambda s: s.values["capped"]),
+    Kind("pyramid", "base (-1, -1, 0) to (1, 1, 0), apex (0, 0, 1)", lambda s: (PYRAMID_CORNERS, [])),
+    Kind("polygon", "planar, by its corners; values: points, and normals where it is smooth", closed=lambda s: False),
+    Kind("triangle", "a polygon of three corners; values: points, and normals where it is smooth", closed=lambda s: False),
+)}
+
+#: Columns of a matrix, each scaled to length about 1, whose determinant is below this count as dependent.
+SINGULAR = 1e-12
+#: A polygon whose corners are further from its plane than this, relative to its size, is not planar.
+NOT_PLANAR = 1e-4
 
 
 @dataclass
@@ -15,33 +64,325 @@ class Solid:
     Parameters
     ----------
     kind : str
-        ``sphere``: the unit sphere about the origin.
+        A name in ``KINDS``.
     matrix : ndarray, shape (4, 4)
-        The kind's own space to the space of the solid's list.
+        Affine, the unit shape's space to the space of the solid's list.
     slot : int
         Material slot of the object.
     values : dict
-        What else its kind needs.
+        What else its kind needs, see ``KINDS``.
     name : str
+
+    Raises
+    ------
+    SceneError
+        For an unknown kind, or a matrix that is not 4 x 4.
     """
 
     kind: str
     matrix: np.ndarray
     slot: int = 0
-    values: dict | None = None
+    values: dict = field(default_factory=dict)
     name: str = ""
+
+    def __post_init__(self):
+        if self.kind not in KINDS:
+            raise SceneError(f"{self.name or 'Solid'}: there is no kind {self.kind!r}. Kinds: {', '.join(KINDS)}.")
+        self.matrix = np.asarray(self.matrix, float)
+        if self.matrix.shape != (4, 4):
+            raise SceneError(f"{self.name or self.kind}: the matrix is 4 x 4, not of shape {self.matrix.shape}.")
 
 
 def sphere(centre, radius, **more):
-    """A sphere, by centre and radius."""
-    matrix = np.diag([radius, radius, radius, 1.0])
-    matrix[:3, 3] = centre
-    return Solid("sphere", matrix, **more)
+    """A sphere by centre and radius; keywords of :class:`Solid` follow, here and below."""
+    return Solid("sphere", _columns((radius, 0, 0), (0, radius, 0), (0, 0, radius), centre), **more)
+
+
+def box(lo, hi, **more):
+    """An axis-aligned box by two opposite corners."""
+    lo, hi = np.asarray(lo, float), np.asarray(hi, float)
+    half = 0.5 * hi - 0.5 * lo
+    return Solid("box", _columns((half[0], 0, 0), (0, half[1], 0), (0, 0, half[2]), 0.5 * lo + 0.5 * hi), **more)
+
+
+def cylinder(base, apex, radius, capped=True, **more):
+    """A cylinder by the ends of its axis and its radius."""
+    return Solid("cylinder", _about_axis(base, apex, radius), values={"capped": capped}, **more)
+
+
+def cone(base, apex, base_radius, apex_radius=0.0, capped=True, **more):
+    """A cone, or the frustum of one, by the ends of its axis and the radii there."""
+    if abs(apex_radius) > abs(base_radius):
+        base, apex, base_radius, apex_radius = apex, base, apex_radius, base_radius
+    ratio = apex_radius / base_radius if base_radius else 0.0
+    return Solid("cone", _about_axis(base, apex, base_radius), values={"ratio": abs(ratio), "capped": capped}, **more)
+
+
+def pyramid(lo, hi, **more):
+    """A pyramid that fills an axis-aligned box: its base is the box's lowest face, its apex the middle of the highest."""
+    lo, hi = np.asarray(lo, float), np.asarray(hi, float)
+    half, middle = 0.5 * hi - 0.5 * lo, 0.5 * lo + 0.5 * hi
+    return Solid("pyramid", _columns((half[0], 0, 0), (0, half[1], 0), (0, 0, hi[2] - lo[2]), (middle[0], middle[1], lo[2])), **more)
+
+
+def polygon(points, normals=None, **more):
+    """A planar polygon by its corners, counter-clockwise seen from outside.
+
+    It need not be convex; a hole is reached by a bridge: two edges that run along each other.
+
+    Parameters
+    ----------
+    points : array_like, shape (k, 3)
+    normals : array_like, shape (k, 3), optional
+        Shading normals at the corners.
+    """
+    points = np.asarray(points, float)
+    if points.ndim != 2 or points.shape[1] != 3:
+        raise SceneError(f"{more.get('name') or 'polygon'}: corners have the shape (k, 3), not {points.shape}.")
+    values = {"points": points}
+    if normals is not None:
+        values["normals"] = np.asarray(normals, float).reshape(points.shape)
+    return Solid("triangle" if len(points) == 3 else "polygon", np.eye(4), values=values, **more)
+
+
+def _columns(x, y, z, origin):
+    """The affine matrix with these columns."""
+    matrix = np.eye(4)
+    matrix[:3, 0], matrix[:3, 1], matrix[:3, 2], matrix[:3, 3] = x, y, z, origin
+    return matrix
+
+
+def _about_axis(base, apex, radius):
+    """Matrix that takes z from 0 to 1 onto an axis, and the unit circle onto one of a radius square to it."""
+    base, apex = np.asarray(base, float), np.asarray(apex, float)
+    axis = apex - base
+    length = math.hypot(*axis)
+    z = axis / length if length > 0.0 else np.array([0.0, 0.0, 1.0])
+    # Duff et al. 2017: an orthonormal basis without a branch that could fail.
+    sign = math.copysign(1.0, z[2])
+    a = -1.0 / (sign + z[2])
+    b = z[0] * z[1] * a
+    x = np.array([1.0 + sign * z[0] * z[0] * a, sign * b, -sign * z[0]])
+    y = np.array([b, sign + z[1] * z[1] * a, -z[1]])
+    return _columns(radius * x, radius * y, axis, base)
+
+
+@dataclass
+class Placed:
+    """Solids of one kind, placed into world space by their objects; columns of length n.
+
+    Attributes
+    ----------
+    solids : list of Solid
+    matrix, inverse : ndarray, shape (3, 3, n)
+        Linear part of the unit space to world map, and its inverse.
+    origin : ndarray, shape (3, n)
+        Where the unit space's origin lies in the world.
+    object_of, primitive_of : ndarray, shape (n,)
+        Object in the scene, index in its list.
+    """
+
+    solids: list
+    matrix: np.ndarray
+    origin: np.ndarray
+    inverse: np.ndarray
+    object_of: np.ndarray
+    primitive_of: np.ndarray
+
+    def value(self, name, default=None):
+        """One of the solids' values, as a column."""
+        return np.array([s.values.get(name, default) for s in self.solids])
+
+
+def place(objects, shapes):
+    """Put solids into world space; those that cannot be used are left out (see :func:`faults`).
+
+    Parameters
+    ----------
+    objects : list of Object
+    shapes : list of (int, int)
+        (object, index in its list), as :class:`~rayscope.core.scene.layout.Layout` has them.
+
+    Returns
+    -------
+    dict
+        Name of the kind -> Placed, in the order of ``KINDS``.
+    """
+    by_kind = {}
+    for i, k in shapes:
+        by_kind.setdefault(objects[i].geometry.solids[k].kind, []).append((i, k))
+    placed = {}
+    for kind in KINDS:
+        if kind not in by_kind:
+            continue
+        columns = _placed(objects, by_kind[kind])
+        good = _usable(kind, columns)
+        if good.all():
+            placed[kind] = columns
+        elif good.any():
+            at = np.flatnonzero(good)
+            placed[kind] = Placed([columns.solids[i] for i in at], columns.matrix[..., at], columns.origin[:, at],
+                                  columns.inverse[..., at], columns.object_of[at], columns.primitive_of[at])
+    return placed
+
+
+def _placed(objects, shapes):
+    """World matrices of solids, by elementwise operations only: BLAS may sum in another order for another n."""
+    solids = [objects[i].geometry.solids[k] for i, k in shapes]
+    a = np.moveaxis(np.array([objects[i].matrix for i, _ in shapes], float), 0, -1)
+    b = np.moveaxis(np.array([s.matrix for s in solids], float), 0, -1)
+    with np.errstate(all="ignore"):
+        product = [[a[r, 0] * b[0, c] + a[r, 1] * b[1, c] + a[r, 2] * b[2, c] for c in range(4)] for r in range(3)]
+        matrix = np.array([row[:3] for row in product])
+        origin = np.array([product[r][3] + a[r, 3] for r in range(3)])
+        inverse = _inverse(matrix)
+    index = np.array(shapes, np.int64)
+    return Placed(solids, matrix, origin, inverse, index[:, 0].astype(np.int32), index[:, 1])
+
+
+def _scaled(matrix):
+    """The matrices with every column scaled by a power of two to a largest entry in [0.5, 1), and the exponents."""
+    exponent = np.frexp(np.abs(matrix).max(axis=0))[1]
+    return np.ldexp(matrix, -exponent), exponent
+
+
+def _cofactors(m):
+    """Matrices of cofactors, shape (3, 3, n)."""
+    return np.array([[m[(r + 1) % 3, (c + 1) % 3] * m[(r + 2) % 3, (c + 2) % 3]
+                      - m[(r + 1) % 3, (c + 2) % 3] * m[(r + 2) % 3, (c + 1) % 3] for c in range(3)] for r in range(3)])
+
+
+def _inverse(matrix):
+    """Inverses of 3 x 3 matrices, shape (3, 3, n)."""
+    scaled, exponent = _scaled(matrix)
+    cofactors = _cofactors(scaled)
+    det = scaled[0, 0] * cofactors[0, 0] + scaled[0, 1] * cofactors[0, 1] + scaled[0, 2] * cofactors[0, 2]
+    return np.ldexp(np.swapaxes(cofactors, 0, 1) / det, -exponent[:, None])
+
+
+def _usable(kind, placed):
+    """Bool per solid: whether it can be traced."""
+    finite = np.isfinite(placed.matrix).all(axis=(0, 1)) & np.isfinite(placed.origin).all(axis=0)
+    if KINDS[kind].hull is None and kind != "sphere":
+        return finite & np.array([not polygon_fault(s.values["points"]) for s in placed.solids])
+    with np.errstate(all="ignore"):
+        scaled, _ = _scaled(placed.matrix)
+        cofactors = _cofactors(scaled)
+        det = sum(scaled[0, c] * cofactors[0, c] for c in range(3))
+    return finite & (np.abs(det) > SINGULAR) & np.isfinite(placed.inverse).all(axis=(0, 1))
+
+
+def faults(objects):
+    """What is wrong with the solids of objects.
+
+    Parameters
+    ----------
+    objects : list of Object
+
+    Returns
+    -------
+    list of (int, int, str)
+        Object, index in its list, and what is wrong; such a solid is left out by :func:`place`.
+    """
+    from .scene import Mesh
+    shapes = [(i, k) for i, o in enumerate(objects) if not isinstance(o.geometry, Mesh) for k in range(len(o.geometry))]
+    found = []
+    by_kind = {}
+    for i, k in shapes:
+        by_kind.setdefault(objects[i].geometry.solids[k].kind, []).append((i, k))
+    for kind, own in by_kind.items():
+        placed = _placed(objects, own)
+        for at in np.flatnonzero(~_usable(kind, placed)):
+            found.append((*own[at], _fault(placed, at)))
+    return sorted(found)
+
+
+def _fault(placed, at):
+    """What is wrong with one solid."""
+    solid, matrix = placed.solids[at], placed.matrix[..., at]
+    if not (np.isfinite(matrix).all() and np.isfinite(placed.origin[:, at]).all()):
+        return f"{solid.kind}: its matrix holds NaN or infinite numbers"
+    if "points" in solid.values:
+        return f"{solid.kind}: {polygon_fault(solid.values['points'])}"
+    flat = [axis for axis, size in zip("xyz", np.abs(matrix).max(axis=0)) if size == 0.0]
+    if flat:
+        return f"{solid.kind}: its size (radius, length) is zero along its own {' and '.join(flat)}"
+    return f"{solid.kind}: its matrix is singular, it is squashed flat or nearly so"
+
+
+def polygon_fault(points):
+    """What is wrong with a polygon's corners, or an empty string."""
+    if not np.isfinite(points).all():
+        return "a corner is NaN or infinite"
+    distinct = len({tuple(p) for p in points.tolist()})
+    if distinct < 3:
+        return f"it has {distinct} distinct corner{'s' if distinct != 1 else ''}, three are needed"
+    normal, anchor = polygon_plane(points)
+    if not normal.any():
+        return "its corners lie on one line"
+    size = np.ptp(points, axis=0).max()
+    off = np.abs((points - anchor) @ normal).max()
+    if off > NOT_PLANAR * size:
+        return f"it is not planar: a corner is {off:.3g} off its plane ({off / size:.1%} of its size); divide it into triangles"
+    return ""
+
+
+def polygon_plane(points):
+    """Unit normal (Newell's, 0 for a polygon without area) and one point of a polygon's plane.
+
+    The point is the mean of the corners; the normal follows the winding, whatever corner comes first.
+    """
+    anchor = points.mean(axis=0)
+    scale = np.abs(points - anchor).max() or 1.0
+    p = (points - anchor) / scale
+    q = np.roll(p, -1, axis=0)
+    normal = np.array([((p[:, 1] - q[:, 1]) * (p[:, 2] + q[:, 2])).sum(), ((p[:, 2] - q[:, 2]) * (p[:, 0] + q[:, 0])).sum(),
+                       ((p[:, 0] - q[:, 0]) * (p[:, 1] + q[:, 1])).sum()])
+    length = math.hypot(*normal)
+    # A long thin polygon's area is small, but nothing like the rounding of its products.
+    return (normal / length if length > 64 * 2.0**-53 * len(points) else np.zeros(3)), anchor
 
 
 def bounds(solid):
-    """Box (lo, hi) of a solid in its list's space, from its kind's exact slab support."""
-    m = np.asarray(solid.matrix, float)
-    # The unit sphere's extent along a world axis is the length of the matrix's row.
-    reach = np.sqrt((m[:3, :3] ** 2).sum(axis=1))
-    return m[:3, 3] - reach, m[:3, 3] + reach
+    """Box (lo, hi) of a solid in its list's space."""
+    low, high = extent(solid, np.eye(3))
+    return low, high
+
+
+def extent(solid, axes):
+    """Exact extents (d, D) of a solid along directions in its list's space.
+
+    Parameters
+    ----------
+    solid : Solid
+    axes : ndarray, shape (m, 3)
+
+    Returns
+    -------
+    d, D : ndarray, shape (m,)
+        Least and greatest a . x over the solid.
+    """
+    axes = np.asarray(axes, float)
+    m = solid.matrix
+    if "points" in solid.values:
+        along = axes @ (solid.values["points"] @ m[:3, :3].T + m[:3, 3]).T
+        return along.min(axis=1), along.max(axis=1)
+    w, middle = axes @ m[:3, :3], axes @ m[:3, 3]
+    if KINDS[solid.kind].hull is None:
+        reach = np.sqrt((w * w).sum(axis=1))
+        return middle - reach, middle + reach
+    points, discs = KINDS[solid.kind].hull(solid)
+    low, high = [], []
+    for p in points:
+        low.append(w @ p)
+        high.append(low[-1])
+    for z, radius in discs:
+        reach = radius * np.sqrt(w[:, 0] ** 2 + w[:, 1] ** 2)
+        low.append(z * w[:, 2] - reach)
+        high.append(z * w[:, 2] + reach)
+    return middle + np.min(low, axis=0), middle + np.max(high, axis=0)
+
+
+def slots(solid):
+    """Material slots of a solid's parts, by their numbers: Hits.part tells which part's surface was met."""
+    return [solid.slot]

@@ -1,0 +1,234 @@
+"""What the kinds of solids share: a ray is taken into the space where the solid is its kind's unit shape.
+
+A unit shape is met by a ray at most twice. A kind's own file says where (``crossings``), what the surface is like there
+(``project``, ``normal``, ``parameters``), how far it reaches (``reach``), and where it is furthest (``furthest``); all
+else is the same for every kind and stands here.
+"""
+
+from importlib import import_module
+
+import numpy as np
+
+from ...scene.solids import place
+
+EPSILON = 2.0**-52
+#: Steps after which two shapes not yet proved to be apart count as touching.
+STEPS = 16
+
+#: Name of a kind -> (file in this folder, its class).
+CLASSES = {"sphere": ("sphere", "Spheres"), "box": ("box", "Boxes"), "cylinder": ("cylinder", "Cylinders"),
+           "cone": ("cone", "Cones"), "pyramid": ("pyramid", "Pyramids"), "polygon": ("polygon", "Polygons"),
+           "triangle": ("polygon", "triangles")}
+
+
+def kinds_of(objects, shapes):
+    """The solids of a scene, one set of primitives for each kind.
+
+    Parameters
+    ----------
+    objects : list of Object
+    shapes : list of (int, int)
+        (object, index in its list).
+    """
+    kinds = []
+    for kind, placed in place(objects, shapes).items():
+        module, name = CLASSES[kind]
+        kinds.append(getattr(import_module(f".{module}", __package__), name)(placed))
+    return kinds
+
+
+def dot(a, b):
+    """Sums of products of columns, shape (3, m) each, in one order of operations."""
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+def unit(v):
+    """Columns with length 1; those without length stay as they are."""
+    # Scaled first, or squares of tiny components underflow.
+    scale = np.abs(v).max(axis=0)
+    scale[scale == 0.0] = 1.0
+    v = v / scale
+    length = np.sqrt(dot(v, v))
+    length[length == 0.0] = 1.0
+    return v / length
+
+
+class UnitShapes:
+    """n solids of one kind.
+
+    Attributes
+    ----------
+    n : int
+    matrix, inverse : ndarray, shape (3, 3, n)
+        Unit space to world, world to unit space.
+    origin : ndarray, shape (3, n)
+        The unit space's origin in the world.
+    object_of, primitive_of : ndarray, shape (n,)
+    """
+
+    KIND = ""
+
+    def __init__(self, placed):
+        self.n = len(placed.solids)
+        self.matrix, self.inverse, self.origin = placed.matrix, placed.inverse, placed.origin
+        self.object_of, self.primitive_of = placed.object_of, placed.primitive_of
+        self.setup(placed)
+        # Most solids are not turned: two thirds of the work of taking a ray to unit space is then adding zeros.
+        self._straight = not any(placed.inverse[r, c].any() for r in range(3) for c in range(3) if r != c)
+        item = np.arange(self.n)
+        extents = [self.support(item, np.broadcast_to(axis, (self.n, 3))) for axis in np.eye(3)]
+        low, high = (np.stack(e, axis=-1) for e in zip(*extents))
+        # Outwards by what square roots and sums may have lost.
+        slack = 8 * EPSILON * np.maximum(np.abs(low), np.abs(high))
+        self.lo, self.hi = low - slack, high + slack
+
+    def setup(self, placed):
+        """Take over the kind's own values."""
+
+    def bounds(self):
+        """World boxes (lo, hi), each of shape (n, 3)."""
+        return self.lo, self.hi
+
+    # The kind's own; o, d, p are columns in unit space, shape (3, m).
+
+    def crossings(self, o, d, item):
+        """Where lines meet unit shapes: (t, face) of the first, (t, face) of the second; t is NaN where there is none.
+
+        Of a closed shape these are where the line enters and leaves, along the whole line.
+        """
+        raise NotImplementedError
+
+    def project(self, p, face, item):
+        """Points near the surface, put onto it."""
+        raise NotImplementedError
+
+    def normal(self, p, face, item):
+        """Outward normals of the unit shape, of any length."""
+        raise NotImplementedError
+
+    def parameters(self, p, face, item):
+        """Surface parameters u, v of points on it."""
+        raise NotImplementedError
+
+    def reach(self, w, item):
+        """Least and greatest w . x over the unit shape."""
+        raise NotImplementedError
+
+    def furthest(self, w, item):
+        """A point of the unit shape with the greatest w . x."""
+        raise NotImplementedError
+
+    # The same for all kinds.
+
+    def _to_unit(self, rays, ray, item):
+        """Origins and directions of pairs in unit space."""
+        q = [rays.o[a].take(ray) - self.origin[a].take(item) for a in range(3)]
+        d = [rays.d[a].take(ray) for a in range(3)]
+        w = self.inverse
+        if self._straight:
+            scale = [w[r, r].take(item) for r in range(3)]
+            return np.stack([s * x for s, x in zip(scale, q)]), np.stack([s * x for s, x in zip(scale, d)])
+        w = [[w[r, c].take(item) for c in range(3)] for r in range(3)]
+        return (np.stack([a * q[0] + b * q[1] + c * q[2] for a, b, c in w]),
+                np.stack([a * d[0] + b * d[1] + c * d[2] for a, b, c in w]))
+
+    def _nearest(self, rays, ray, item, t_far):
+        """Pairs that hit, their nearer crossing in the ray's interval, and its face, beside the rays in unit space."""
+        with np.errstate(all="ignore"):
+            o, d = self._to_unit(rays, ray, item)
+            t, face, t_second, second = self.crossings(o, d, item)
+            t_min, t_max = rays.t_min.take(ray), t_far.take(ray)
+            use = (t >= t_min) & (t <= t_max) & (np.abs(t) < np.inf)
+            later = (t_second >= t_min) & (t_second <= t_max) & (np.abs(t_second) < np.inf)
+        pair = np.flatnonzero(use | later)
+        use = use[pair]
+        return pair, np.where(use, t[pair], t_second[pair]), np.where(use, face[pair], second[pair]), o, d
+
+    def intersect(self, rays, ray, item, t_far):
+        """Nearest hits of pairs; see the package's interface. `detail` is the face."""
+        pair, t, face, o, d = self._nearest(rays, ray, item, t_far)
+        item = item[pair]
+        u, v = self.parameters(self.project(o[:, pair] + t * d[:, pair], face, item), face, item)
+        return pair, t, u, v, face
+
+    def blocks(self, rays, ray, item, t_far):
+        """The pairs that hit."""
+        return self._nearest(rays, ray, item, t_far)[0]
+
+    def intersections(self, rays, ray, item):
+        """Where lines enter and leave closed shapes, for CSG.
+
+        Returns
+        -------
+        t_in, t_out : ndarray
+            NaN for pairs that do not meet; t_in <= t_out.
+        face_in, face_out : ndarray
+        """
+        with np.errstate(all="ignore"):
+            t_in, face_in, t_out, face_out = self.crossings(*self._to_unit(rays, ray, item), item)
+        miss = ~(t_in <= t_out)
+        return np.where(miss, np.nan, t_in), np.where(miss, np.nan, t_out), face_in, face_out
+
+    def surface(self, rays, item, t, u, v, face):
+        """Object, primitive, part, normal, point and error of hits, one a ray."""
+        o, d = self._to_unit(rays, np.arange(len(item)), item)
+        p = self.project(o + t * d, face, item)
+        m, w, origin = self.matrix[:, :, item], self.inverse[:, :, item], self.origin[:, item]
+        q = np.stack([m[r, 0] * p[0] + m[r, 1] * p[1] + m[r, 2] * p[2] for r in range(3)])
+        n = self.normal(p, face, item)
+        normal = unit(np.stack([w[0, c] * n[0] + w[1, c] * n[1] + w[2, c] * n[2] for c in range(3)]))
+        # What unit space rounds off, seen from the world: a ray that starts at `point` is taken there again.
+        size = np.abs(p) + np.stack([(np.abs(w[r]) * np.abs(q)).sum(axis=0) for r in range(3)])
+        error = 8 * EPSILON * (np.stack([(np.abs(m[r]) * size).sum(axis=0) for r in range(3)]) + np.abs(origin)).max(axis=0)
+        return self.object_of[item], self.primitive_of[item], np.zeros(len(item), np.int32), normal.T, (q + origin).T, error
+
+    def support(self, item, axis):
+        """Exact extents (d, D) along the directions `axis`, shape (m, 3)."""
+        m, c, a = self.matrix[:, :, item], self.origin[:, item], axis.T
+        w = np.stack([m[0, k] * a[0] + m[1, k] * a[1] + m[2, k] * a[2] for k in range(3)])
+        middle = c[0] * a[0] + c[1] * a[1] + c[2] * a[2]
+        low, high = self.reach(w, item)
+        return middle + low, middle + high
+
+    def overlaps(self, item, lo, hi):
+        """Bool per pair: whether the solid, its inside included, touches the box.
+
+        Gilbert (1966): of all differences between a point of the solid and one of the box, the one nearest to zero is
+        approached. A plane across it proves that they are apart; without a proof they are not.
+        """
+        touches = ((self.lo[item] <= hi) & (self.hi[item] >= lo)).all(axis=1)
+        open_ = np.flatnonzero(touches)
+        centre, half = (0.5 * (lo + hi)).T, (0.5 * (hi - lo)).T
+        x = None
+        for _ in range(STEPS):
+            if not len(open_):
+                break
+            i = item[open_]
+            m, w, origin = self.matrix[:, :, i], self.inverse[:, :, i], self.origin[:, i]
+            c, h = centre[:, open_], half[:, open_]
+            # In unit space the box is centred at b, with the half-edges w[:, k] * h[k].
+            b = c - origin
+            b = np.stack([w[r, 0] * b[0] + w[r, 1] * b[1] + w[r, 2] * b[2] for r in range(3)])
+            if x is None:
+                x = -b
+            toward = [w[0, k] * x[0] + w[1, k] * x[1] + w[2, k] * x[2] for k in range(3)]
+            corner = [np.copysign(h[k], toward[k]) for k in range(3)]
+            corner = b + np.stack([w[r, 0] * corner[0] + w[r, 1] * corner[1] + w[r, 2] * corner[2] for r in range(3)])
+            y = self.furthest(-x, i) - corner
+            along = dot(x, y)
+            size = np.abs(x).max(axis=0) * (np.abs(corner).max(axis=0) + 2.0)
+            apart = along > 64 * EPSILON * size
+            touches[open_[apart]] = False
+            e = y - x
+            length = dot(e, e)
+            # Nearest to zero on the way from x to y.
+            with np.errstate(all="ignore"):
+                s = np.clip(-dot(x, e) / length, 0.0, 1.0)
+            going = np.flatnonzero(~apart & (length > 0.0))
+            open_, x = open_[going], (x + s * e)[:, going]
+        return touches
+
+    def clip(self, item, lo, hi):
+        """Boxes of the parts inside boxes, by the solids' own boxes; empty where a solid does not touch."""
+        touches = self.overlaps(item, lo, hi)[:, None]
+        return (np.where(touches, np.maximum(self.lo[item], lo), np.inf), np.where(touches, np.minimum(self.hi[item], hi), -np.inf))

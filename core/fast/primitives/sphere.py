@@ -1,0 +1,44 @@
+"""The sphere, under any affine matrix: an ellipsoid."""
+
+import numpy as np
+
+from .solids import UnitShapes, dot, unit
+
+
+class Spheres(UnitShapes):
+    """Unit spheres about the origin."""
+
+    KIND = "sphere"
+
+    def crossings(self, o, d, item):
+        # |o + t d| = 1: a t^2 + 2 b t + c = 0
+        a, b = dot(d, d), dot(o, d)
+        distance = np.sqrt(dot(o, o))
+        c = (distance - 1.0) * (distance + 1.0)
+        # The discriminant from the ray's nearest point to the centre: b * b - a * c would cancel for a far origin
+        # (Haines et al., Ray Tracing Gems, chapter 7).
+        foot = o - (b / a) * d
+        nearest = np.sqrt(dot(foot, foot))
+        root = np.sqrt(a * ((1.0 - nearest) * (1.0 + nearest)))
+        # The root without cancellation first, the other from the product of both.
+        q = -b - np.copysign(root, b)
+        t, s = q / a, np.where(q == 0.0, 0.0, c / q)
+        face = np.zeros(len(a), np.int64)
+        return np.minimum(t, s), face, np.maximum(t, s), face
+
+    def project(self, p, face, item):
+        return unit(p)
+
+    def normal(self, p, face, item):
+        return p
+
+    def parameters(self, p, face, item):
+        """Longitude from 0 to 1, and the angle from +z over pi."""
+        return np.arctan2(p[1], p[0]) / (2.0 * np.pi) % 1.0, np.arccos(np.clip(p[2], -1.0, 1.0)) / np.pi
+
+    def reach(self, w, item):
+        length = np.sqrt(dot(w, w))
+        return -length, length
+
+    def furthest(self, w, item):
+        return unit(w)
