@@ -16,7 +16,8 @@ from enable import PACKAGE, enable_checkout  # noqa: E402
 # BLENDER_USER_RESOURCES is read when Blender starts: here for the bpy module, by our caller for Blender itself.
 if sys.modules.get("bpy") and "BLENDER_USER_RESOURCES" not in os.environ:
     raise pytest.UsageError("set BLENDER_USER_RESOURCES to an empty folder before starting Blender")
-user_folder = os.environ.setdefault("BLENDER_USER_RESOURCES", tempfile.mkdtemp(prefix="rayscope-test-"))
+user_folder = os.environ.get("BLENDER_USER_RESOURCES") or tempfile.mkdtemp(prefix="rayscope-test-")
+os.environ["BLENDER_USER_RESOURCES"] = user_folder
 try:
     import bpy
 except ImportError:
