@@ -1,0 +1,127 @@
+"""What stands where: the depsgraph's instances -> core objects and lights.
+
+Curves, text, surfaces, metaballs, and what geometry nodes and collections place, all appear in the depsgraph as
+instances of meshes; each mesh is read once and shared.
+"""
+
+import numpy as np
+
+from ...core.scene.scene import Object
+from .lights import read_light
+from .materials import Materials
+from .meshes import read_corner_colours, read_corner_uvs, read_mesh
+
+#: Types that give no triangles, and what they are called.
+NOT_TRACED = {"VOLUME": "a volume", "CURVES": "hair curves", "POINTCLOUD": "a point cloud", "GREASEPENCIL": "a grease pencil drawing"}
+
+
+def read_objects(depsgraph, for_render, notices):
+    """All visible objects and lights.
+
+    Parameters
+    ----------
+    depsgraph : bpy.types.Depsgraph
+    for_render : bool
+        Leave out what is hidden in renders.
+    notices : Notices
+
+    Returns
+    -------
+    objects : list of Object
+    lights : list of Light
+    """
+    hidden = _hidden_collections(depsgraph.view_layer) if for_render else set()
+    geometries, materials = Geometries(notices), Materials(notices)
+    objects, lights = [], []
+    for instance in depsgraph.object_instances:
+        obj = instance.object
+        if obj.type not in NOT_TRACED and obj.type not in {"MESH", "LIGHT"}:
+            continue
+        if not instance.show_self or (for_render and _hidden_in_renders(instance, hidden)):
+            continue
+        matrix = np.array(instance.matrix_world, float)
+        if obj.type == "LIGHT":
+            lights.append(read_light(obj, matrix, notices))
+        elif obj.type == "MESH":
+            own = materials.of(obj)
+            geometry = geometries.of(obj, own)
+            if len(geometry):
+                objects.append(Object(obj.name, geometry, matrix, tuple(m.material for m in own)))
+        else:
+            notices.add(obj.name, f"{NOT_TRACED[obj.type]} cannot be traced; it was left out. Convert it to a mesh.")
+    return objects, lights
+
+
+class Geometries:
+    """What objects consist of, each geometry once.
+
+    An object is a mesh here; what else one could become (a CSG tree, an analytic solid) is decided in :meth:`of`.
+    """
+
+    def __init__(self, notices):
+        self.notices = notices
+        self._meshes = {}
+
+    def of(self, obj, materials):
+        """The geometry of an evaluated object, with the corner data its materials look up."""
+        return self._mesh(obj, materials)
+
+    def _mesh(self, obj, materials):
+        # Pointers identify data only while the depsgraph stands still: within one read.
+        key = obj.data.as_pointer()
+        if key not in self._meshes:
+            self._meshes[key] = read_mesh(obj.data)
+        mesh, corners = self._meshes[key]
+        if len(mesh):
+            self._add(obj, mesh, corners, "corner_uvs", read_corner_uvs, [m.uv_name for m in materials if m.material.texture])
+            self._add(obj, mesh, corners, "corner_colours", read_corner_colours,
+                      [m.colour_name for m in materials if m.material.vertex_colours])
+        return mesh
+
+    def _add(self, obj, mesh, corners, field, read, wanted):
+        """Read texture coordinates or colours, once a material looks them up; the mesh holds one set of each."""
+        if not wanted or getattr(mesh, field) is not None:
+            return
+        name = next((n for n in wanted if n), None)
+        values = read(obj.data, name)
+        if values is not None:
+            setattr(mesh, field, values[corners])
+        elif field == "corner_uvs":
+            self.notices.add(obj.name, f"it has no UV map{f' named {name}' if name else ''}, but its material has a texture; "
+                             "its first pixel is used. Unwrap the mesh.")
+        else:
+            self.notices.add(obj.name, f"it has no colour attribute{f' named {name}' if name else ''}, but its material asks for one; "
+                             "white was used.")
+        if len(set(wanted)) > 1:
+            self.notices.add(obj.name, f"its materials look up several layers; one alone is read: {name}.")
+
+
+def _hidden_in_renders(instance, hidden):
+    """Whether a render leaves an instance out, though the viewport shows it.
+
+    What a geometry-nodes modifier or a parent places is drawn even if the original is hidden: there the placing object
+    decides. A collection's members keep their own flag.
+    """
+    if not instance.is_instance:
+        return instance.object.hide_render or instance.object.original.name_full in hidden
+    parent = instance.parent
+    if parent.hide_render or parent.original.name_full in hidden:
+        return True
+    return parent.instance_type == "COLLECTION" and instance.object.hide_render
+
+
+def _hidden_collections(view_layer):
+    """Names of the objects that no collection shows in renders."""
+    shown, everything = set(), set()
+
+    def visit(layer, visible):
+        visible = visible and not layer.collection.hide_render
+        names = {o.name_full for o in layer.collection.objects}
+        everything.update(names)
+        if visible and not layer.exclude:
+            shown.update(names)
+        for child in layer.children:
+            visit(child, visible)
+
+    visit(view_layer.layer_collection, True)
+    return everything - shown
