@@ -60,21 +60,22 @@ class Closest:
 
     def keep(self, ray, item, t, u, v, detail):
         """Take over hits found elsewhere; several may belong to one ray."""
-        old_t, old_item = self.t[ray], self.item[ray]
+        old_t, old_item = self.t.take(ray), self.item.take(ray)
         # A hit at t_max itself counts, hence <= while there is no hit yet.
         better = np.flatnonzero((t < old_t) | ((t == old_t) & ((old_item < 0) | (item < old_item))))
         if not len(better):
             return
-        ray, item, t = ray[better], item[better], t[better]
-        # Sorted so that a ray's best hit comes first: unique then keeps it.
-        order = np.lexsort((item, t, ray))
-        first = np.ones(len(order), bool)
-        first[1:] = ray[order[1:]] != ray[order[:-1]]
-        best = order[first]
-        r = ray[best]
-        self.t[r], self.item[r] = t[best], item[best]
-        best = better[best]
-        self.u[r], self.v[r], self.detail[r] = u[best], v[best], detail[best]
+        ray, item, t = ray.take(better), item.take(better), t.take(better)
+        np.minimum.at(self.t, ray, t)
+        nearest = np.flatnonzero(t == self.t.take(ray))
+        ray, item, better = ray.take(nearest), item.take(nearest), better.take(nearest)
+        self.item[ray] = item
+        # Of hits at the same t the assignment kept the last; give way to lower numbers until none is left.
+        while len(lower := np.flatnonzero(self.item.take(ray) > item)):
+            self.item[ray[lower]] = item[lower]
+        mine = np.flatnonzero(self.item.take(ray) == item)
+        ray, better = ray.take(mine), better.take(mine)
+        self.u[ray], self.v[ray], self.detail[ray] = u.take(better), v.take(better), detail.take(better)
 
 
 class Occluded:

@@ -21,7 +21,7 @@ class Rays:
         The scaled direction times 2**exponent is the caller's.
     """
 
-    def __init__(self, o, d, t_min, t_max, exponent=None):
+    def __init__(self, o, d, t_min, t_max, exponent):
         self.n = o.shape[1]
         self.o, self.d, self.t_min, self.t_max, self.exponent = o, d, t_min, t_max, exponent
 
@@ -47,17 +47,25 @@ class Rays:
         if directions.shape[1] != n:
             raise ValueError(f"{n} origins but {directions.shape[1]} directions.")
         t_min, t_max = (np.broadcast_to(np.asarray(t, float), (n,)) for t in (t_min, t_max))
-        largest = np.abs(directions).max(axis=0, initial=0.0)
-        usable = np.isfinite(origins).all(axis=0) & np.isfinite(largest) & (largest > 0.0) & (t_min <= t_max)
+        size = np.abs(directions)
+        largest = np.maximum(np.maximum(size[0], size[1]), size[2])
+        # A NaN or infinite origin makes this NaN.
+        finite = (origins[0] + origins[1] + origins[2]) * 0.0 == 0.0
+        usable = finite & (largest > 0.0) & (largest < np.inf) & (t_min <= t_max)
         index = np.flatnonzero(usable)
-        exponent = np.frexp(largest[index])[1] - 1
-        d = np.ldexp(directions[:, index], -exponent)
-        return cls(origins[:, index], d, np.ldexp(t_min[index], exponent), np.ldexp(t_max[index], exponent), exponent), index
+        if len(index) < n:
+            origins, directions, largest = origins.take(index, axis=1), directions.take(index, axis=1), largest[index]
+            t_min, t_max = t_min[index], t_max[index]
+        exponent = np.frexp(largest)[1] - 1
+        return cls(origins, np.ldexp(directions, -exponent), np.ldexp(t_min, exponent), np.ldexp(t_max, exponent), exponent), index
 
     def take(self, index):
         """Some of the rays; `index` is an array or a slice."""
-        return Rays(self.o[:, index], self.d[:, index], self.t_min[index], self.t_max[index],
-                    None if self.exponent is None else self.exponent[index])
+        if isinstance(index, slice):
+            o, d = self.o[:, index], self.d[:, index]
+        else:
+            o, d = self.o.take(index, axis=1), self.d.take(index, axis=1)
+        return Rays(o, d, self.t_min[index], self.t_max[index], self.exponent[index])
 
     def callers_t(self, t):
         """t in multiples of the caller's directions."""
@@ -82,13 +90,20 @@ class Rays:
         s : ndarray, shape (3, n)
             Sx, Sy, Sz.
         """
-        kz = np.abs(self.d).argmax(axis=0)
-        kx, ky = (kz + 1) % 3, (kz + 2) % 3
+        x, y, z = np.abs(self.d)
+        kz = np.where(z > np.maximum(x, y), 2, (y > x).astype(np.int64))
         i = np.arange(self.n)
-        dz = self.d[kz, i]
-        kx, ky = np.where(dz < 0.0, ky, kx), np.where(dz < 0.0, kx, ky)
+        flat = np.ascontiguousarray(self.d).ravel()
+        dz = flat.take(kz * self.n + i)
+        turn = dz < 0.0
+        # The next axis and the one after; the other way round where the ray runs against its main axis.
+        kx, ky = kz + 1 + turn, kz + 2 - turn
+        kx[kx > 2] -= 3
+        ky[ky > 2] -= 3
         axes = np.stack([kx, ky, kz])
-        return axes, self.o[axes, i], np.stack([self.d[kx, i] / dz, self.d[ky, i] / dz, 1.0 / dz])
+        place = axes * self.n + i
+        s = np.stack([flat.take(place[0]) / dz, flat.take(place[1]) / dz, 1.0 / dz])
+        return axes, np.ascontiguousarray(self.o).ravel().take(place), s
 
 
 def _columns(points, what):

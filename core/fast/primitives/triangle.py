@@ -32,6 +32,7 @@ class Triangles:
         self.xyz, self.object_of, self.primitive_of, self.flip = xyz, object_of, primitive_of, flip
         self.n = xyz.shape[1]
         self._flat = xyz.ravel()
+        self.flips = bool(flip.any())
 
     @classmethod
     def of(cls, objects, which):
@@ -96,30 +97,41 @@ class Triangles:
 
     def surface(self, rays, item, t, u, v, detail):
         """Object, primitive, part, normal, point and error of hits."""
-        xyz = self.xyz[:, item]
-        normal = self.normals(item)
-        a, b, c = (1.0 - u - v) * xyz[0:3], u * xyz[3:6], v * xyz[6:9]
-        point = a + b + c
-        error = GAMMA_7 * (np.abs(a) + np.abs(b) + np.abs(c)).max(axis=0)
-        return self.object_of[item], self.primitive_of[item], np.zeros(len(item), np.int32), normal, point.T, error
+        rows = self._rows(item)
+        point, error = np.empty((3, len(item))), np.zeros(len(item))
+        w = 1.0 - u - v
+        for axis in range(3):
+            a, b, c = w * rows[axis], u * rows[axis + 3], v * rows[axis + 6]
+            np.add(a + b, c, out=point[axis])
+            np.maximum(error, np.abs(a) + np.abs(b) + np.abs(c), out=error)
+        error *= GAMMA_7
+        return (self.object_of.take(item), self.primitive_of.take(item), np.zeros(len(item), np.int32),
+                self._normals(rows, item).T, point.T, error)
 
-    def normals(self, item):
-        """Unit normals, shape (m, 3), outward by winding and object matrix; 0 for triangles without area."""
-        xyz = self.xyz[:, item]
-        # Scaled first, or the cross product of tiny edges underflows.
-        e, f = xyz[3:6] - xyz[0:3], xyz[6:9] - xyz[0:3]
-        scale = np.maximum(np.abs(e).max(axis=0), np.abs(f).max(axis=0))
-        scale[scale == 0.0] = 1.0
-        e, f = e / scale, f / scale
+    def _rows(self, item):
+        """The columns of some triangles: nine arrays."""
+        return [row.take(item) for row in self.xyz]
+
+    def _normals(self, rows, item):
+        """Unit normals, shape (3, m), outward by winding and object matrix; 0 for triangles without area."""
+        e, f = ([rows[axis + k] - rows[axis] for axis in range(3)] for k in (3, 6))
+        # Scaled by a power of two first, or the cross product of tiny edges underflows.
+        size = np.abs(e[0])
+        for edge in (*e[1:], *f):
+            np.maximum(size, np.abs(edge), out=size)
+        shift = -np.frexp(size)[1]
+        e, f = ([np.ldexp(edge, shift) for edge in some] for some in (e, f))
         normal = np.stack([e[1] * f[2] - e[2] * f[1], e[2] * f[0] - e[0] * f[2], e[0] * f[1] - e[1] * f[0]])
         length = np.sqrt(normal[0] * normal[0] + normal[1] * normal[1] + normal[2] * normal[2])
         length[length == 0.0] = 1.0
-        length[self.flip[item]] *= -1.0
-        return (normal / length).T
+        if self.flips:
+            length[self.flip[item]] *= -1.0
+        normal /= length
+        return normal
 
     def overlaps(self, item, lo, hi):
         """Bool per pair: whether the triangle touches the box (Akenine-Moller 2001: 13 separating axes)."""
-        xyz = self.xyz[:, item]
+        xyz = np.array(self._rows(item))
         lo, hi = lo.T, hi.T
         centre, half = 0.5 * (lo + hi), 0.5 * (hi - lo)
         v = [xyz[3 * k:3 * k + 3] - centre for k in range(3)]

@@ -1,20 +1,15 @@
-"""Local light: emission, ambient, and from each light Lambert's diffuse and Blinn and Phong's highlight."""
+"""What surfaces reflect of the lights: Lambert's diffuse, Blinn and Phong's highlight."""
 
 import math
 
 import numpy as np
 
+from .lights import arriving
 from .sampling import LIGHTS, number
 from .vectors import dot, unit
 
 
-def unlit(table, surface, ambient):
-    """Emission and ambient light, shape (3, n); `ambient` is the RGB radiance of the surroundings."""
-    m = surface.material
-    return table.emission[:, m] + ambient[:, None] * (table.ambient[m] * surface.base)
-
-
-def lit(table, surface, d, lights, transmitted, key, kind_of):
+def lit(table, surface, d, lights, transmitted, key):
     """What surfaces reflect of the lights.
 
     Parameters
@@ -29,8 +24,6 @@ def lit(table, surface, d, lights, transmitted, key, kind_of):
         the points `which` from `to`.
     key : ndarray of uint64, or None
         Keys of the rays, where lights have an extent to be sampled.
-    kind_of : callable
-        ``arriving`` of the module lights.
 
     Returns
     -------
@@ -40,7 +33,7 @@ def lit(table, surface, d, lights, transmitted, key, kind_of):
     view = unit(d)
     for k, light in enumerate(lights):
         u, v = (None, None) if key is None else (number(key, LIGHTS + 2 * k), number(key, LIGHTS + 2 * k + 1))
-        to, reach, towards, irradiance = kind_of(light, surface.point, u, v)
+        to, reach, towards, irradiance = arriving(light, surface.point, u, v)
         cosine = dot(surface.shading, towards)
         flat = dot(surface.normal, towards)
         which = np.flatnonzero((cosine > 0.0) & (flat > 0.0) & (irradiance > 0.0))

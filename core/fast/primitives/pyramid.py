@@ -1,0 +1,30 @@
+"""The pyramid over a square, under any affine matrix."""
+
+import numpy as np
+
+from ...scene.solids import PYRAMID_CORNERS
+from .polytope import Polytopes
+
+
+class Pyramids(Polytopes):
+    """Pyramids with the base (-1, -1, 0) to (1, 1, 0) and the apex (0, 0, 1). Faces: -x, +x, -y, +y, base."""
+
+    KIND = "pyramid"
+    PLANES = (((-1.0, 0.0, 1.0), 1.0), ((1.0, 0.0, 1.0), 1.0), ((0.0, -1.0, 1.0), 1.0), ((0.0, 1.0, 1.0), 1.0),
+              ((0.0, 0.0, -1.0), 0.0))
+    CORNERS = PYRAMID_CORNERS
+
+    def project(self, p, face, item):
+        z = np.where(face == 4, 0.0, np.clip(p[2], 0.0, 1.0))
+        width = 1.0 - z
+        q = np.stack([np.minimum(np.maximum(p[0], -width), width), np.minimum(np.maximum(p[1], -width), width), z])
+        side = np.flatnonzero(face < 4)
+        q[face[side] >> 1, side] = ((face[side] & 1) * 2.0 - 1.0) * width[side]
+        return q
+
+    def parameters(self, p, face, item):
+        """On a side: across it, and the height; on the base: x and y, from 0 to 1."""
+        across = np.where(face >> 1 == 0, p[1], p[0])
+        width = 1.0 - p[2]
+        across = across / np.where(width > 0.0, width, 1.0)
+        return 0.5 * across + 0.5, np.where(face == 4, 0.5 * p[1] + 0.5, p[2])

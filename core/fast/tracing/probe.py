@@ -1,0 +1,73 @@
+"""Asking a structure, in pieces short enough that progress can be shown and a run stopped, and counting what it cost."""
+
+import time
+from dataclasses import fields
+
+import numpy as np
+
+from ...hits import Hits
+
+#: Seconds that one piece may take: half of what a user may have to wait for the run to stop.
+PIECE = 0.08
+COUNTED = ("n_it", "n_ts", "n_ets", "n_eets")
+
+
+class Probe:
+    """One structure, as the tracer asks it.
+
+    Parameters
+    ----------
+    structure : Structure
+    check : callable
+        Called without arguments between pieces; may raise Cancelled.
+    count : bool
+    """
+
+    def __init__(self, structure, check, count):
+        self.structure, self.check, self.count = structure, check, count
+        self.piece = 4096
+
+    def closest(self, o, d, t_min, t_max):
+        """Hits of rays given as columns."""
+        def ask(s):
+            return self.structure.closest(o[:, s].T, d[:, s].T, t_min=_part(t_min, s), t_max=_part(t_max, s),
+                                          count=self.count, progress=self._progress)
+        parts = self._in_pieces(o.shape[1], ask)
+        if len(parts) == 1:
+            return parts[0]
+        joined = {f.name: [getattr(p, f.name) for p in parts] for f in fields(Hits)}
+        return Hits(**{name: None if values[0] is None else np.concatenate(values) for name, values in joined.items()})
+
+    def occluded(self, o, d, t_max):
+        """Bool per ray, and the counts."""
+        def ask(s):
+            answer = self.structure.occluded(o[:, s].T, d[:, s].T, t_max=_part(t_max, s), count=self.count,
+                                             progress=self._progress)
+            return answer if self.count else (answer, {})
+        parts = self._in_pieces(o.shape[1], ask)
+        counts = {name: np.concatenate([c[name] for _, c in parts]) for name in (COUNTED if self.count else ())}
+        return np.concatenate([blocked for blocked, _ in parts]), counts
+
+    def _progress(self, fraction):
+        self.check()
+
+    def _in_pieces(self, n, ask):
+        """Answers for slices of n rays; their length follows the speed that is met."""
+        answers, start = [], 0
+        while start < n or not answers:
+            size = self.piece
+            began = time.perf_counter()
+            answers.append(ask(slice(start, start + size)))
+            took = time.perf_counter() - began
+            if took > PIECE:
+                self.piece = max(64, size // 2)
+            elif took < PIECE / 3 and n - start >= size:
+                self.piece = min(131_072, size * 2)
+            start += size
+            self.check()
+        return answers
+
+
+def _part(value, s):
+    """A slice of an array, or the number that stands for all."""
+    return value[s] if np.ndim(value) else value

@@ -1,0 +1,268 @@
+"""Whitted's ray tracer (1980), wave by wave.
+
+A wave is a batch of rays with the weight that what they see has in their pixels. Each is intersected, shaded, and
+sends on new waves of reflected, refracted and transparent rays, which wait on a stack; waves that wait are joined until
+they are long enough to be worth numpy's calls. The sum over all waves is the picture, as in the recursion; the stack
+holds one wave a level, so memory does not grow with the number of rays.
+
+Modules for lights, glass, mirrors and textures are imported only for a scene that has any.
+"""
+
+import math
+
+import numpy as np
+
+from . import sampling
+from .camera import primary
+from .probe import COUNTED, Probe
+from .surface import Surfaces
+from .vectors import dot, pushed, unit
+
+#: Rays of a wave, about.
+WAVE = 65_536
+#: Side of the tiles that the picture is made in.
+TILE = 256
+
+PRIMARY, REFLECTED, REFRACTED, TRANSPARENT, SHADOW = range(5)
+KINDS = ("primary", "reflected", "refracted", "transparent", "shadow")
+
+
+class Wave:
+    """Rays that wait to be traced.
+
+    Attributes
+    ----------
+    o, d : ndarray, shape (3, n)
+    t_min, t_max : float or ndarray, shape (n,)
+    weight : ndarray, shape (3, n)
+        Share of their radiance in the pixel.
+    pixel : ndarray, shape (n,)
+        Number in the tile.
+    depth : ndarray, shape (n,)
+        Reflections and refractions so far.
+    kind : ndarray, shape (n,)
+    key : ndarray, shape (n,), uint64, or None
+        Of their random numbers.
+    """
+
+    def __init__(self, o, d, t_max, weight, pixel, depth, kind, key, t_min=None):
+        self.o, self.d, self.t_max, self.weight = o, d, t_max, weight
+        self.pixel, self.depth, self.kind, self.key = pixel, depth, kind, key
+        self.t_min = 0.0 if t_min is None else t_min
+
+    def __len__(self):
+        return len(self.pixel)
+
+    @classmethod
+    def joined(cls, waves):
+        """One wave from several."""
+        if len(waves) == 1:
+            return waves[0]
+        return cls(*(np.concatenate([getattr(w, name) for w in waves], axis=-1) for name in
+                     ("o", "d", "t_max", "weight", "pixel", "depth", "kind")),
+                   None if waves[0].key is None else np.concatenate([w.key for w in waves]))
+
+
+class Whitted:
+    """The tracer of one picture.
+
+    Parameters
+    ----------
+    scene : Scene
+    structures : dict
+        ``primary``, ``secondary``, ``shadow``: the structure that answers each kind of ray.
+    size : (int, int)
+    depth : int
+        Reflections and refractions in a row, at most (H).
+    samples : int
+        Samples a pixel that the picture will have.
+    seed : int
+    count : bool
+        Also count intersection tests and traversal steps.
+    check : callable
+        Called without arguments every few ten milliseconds; may raise Cancelled.
+
+    Attributes
+    ----------
+    tally : dict
+        Per kind of ray: rays, hits, n_it, n_ts, n_ets, n_eets.
+    """
+
+    tile_side = TILE
+
+    def __init__(self, scene, structures, size, depth, samples, seed, count, check):
+        self.scene, self.size, self.depth, self.samples, self.seed, self.count = scene, size, depth, samples, seed, count
+        self.check = check
+        probes = {id(s): Probe(s, check, count) for s in structures.values()}
+        self.probe = {kind: probes[id(s)] for kind, s in structures.items()}
+        self.surfaces = Surfaces(scene)
+        self.ambient = np.array(scene.world.ambient_light(), float)
+        self.tally = {kind: dict.fromkeys(("rays", "hits", *COUNTED), 0) for kind in KINDS}
+        materials = scene.used_materials()
+        self.bounces = depth > 0 and any(m.reflects or m.refracts for m in materials)
+        self.transparent = any(m.transparent for m in materials)
+        self.coloured_shadows = self.transparent or any(m.refracts for m in materials)
+        self.lights = [light for light in scene.lights if any(light.colour)]
+        self.soft = samples > 1 and any(light.has_extent for light in self.lights)
+
+    def tile(self, x0, y0, x1, y1, sample):
+        """One sample of every pixel with x0 <= x < x1, y0 <= y < y1.
+
+        Returns
+        -------
+        dict
+            Arrays with one entry a pixel, row by row from the bottom: ``combined`` (n, 3), ``rays_per_pixel``, ``n_it`` and
+            ``n_ts`` where counted; for sample 0 also ``depth``, ``normal``, ``position``, ``object_index`` and
+            ``primitive_index``.
+        """
+        pixels = (np.arange(y0, y1)[:, None] * self.size[0] + np.arange(x0, x1)).ravel()
+        n = len(pixels)
+        key = sampling.first_key(pixels, sample, self.seed) if self.samples > 1 else None
+        o, d = primary(self.scene.camera, self.size, pixels, key)
+        self.radiance = np.zeros((3, n))
+        self.per_pixel = {name: np.zeros(n, np.int64) for name in
+                          ("rays_per_pixel", *(("n_it", "n_ts") if self.count else ()))}
+        camera = self.scene.camera
+        stack = [Wave(o, d, np.full(n, float(camera.far)), np.ones((3, n)), np.arange(n), np.zeros(n, np.int32),
+                      np.full(n, PRIMARY, np.uint8), key if self.soft else None, t_min=float(camera.near))]
+        out = {}
+        while stack:
+            wave = self._next(stack)
+            hits = self._closest(wave)
+            met = np.flatnonzero(hits.primitive >= 0)
+            surface = self.surfaces.at(hits, met, wave.d[:, met])
+            if not out:
+                out = {} if sample else self._first(hits, met, surface)
+                out["combined"] = None
+            self._shade(wave, hits, met, surface)
+            stack += self._onward(wave, hits, met, surface)
+        out["combined"] = self.radiance.T
+        out.update(self.per_pixel)
+        return out
+
+    @staticmethod
+    def _next(stack):
+        """Take waves off the stack until they are WAVE rays, or none is left."""
+        waves = [stack.pop()]
+        n = len(waves[0])
+        while stack and n + len(stack[-1]) <= WAVE:
+            waves.append(stack.pop())
+            n += len(waves[-1])
+        return Wave.joined(waves)
+
+    def _closest(self, wave):
+        """Nearest hits, counted."""
+        first = wave.kind[0] == PRIMARY
+        hits = self.probe["primary" if first else "secondary"].closest(wave.o, wave.d, wave.t_min, wave.t_max)
+        for kind in (PRIMARY,) if first else (REFLECTED, REFRACTED, TRANSPARENT):
+            which = slice(None) if first else np.flatnonzero(wave.kind == kind)
+            self._count(kind, wave.pixel[which], np.count_nonzero(hits.primitive[which] >= 0),
+                        {name: getattr(hits, name)[which] for name in COUNTED} if self.count else {})
+        return hits
+
+    def _count(self, kind, pixel, n_hits, counts):
+        """Add rays to the tally and to their pixels."""
+        tally = self.tally[KINDS[kind]]
+        tally["rays"] += len(pixel)
+        tally["hits"] += int(n_hits)
+        n = self.radiance.shape[1]
+        self.per_pixel["rays_per_pixel"] += np.bincount(pixel, minlength=n)
+        for name, values in counts.items():
+            tally[name] += int(values.sum())
+            if name in self.per_pixel:
+                self.per_pixel[name] += np.bincount(pixel, values, minlength=n).astype(np.int64)
+
+    def _first(self, hits, met, surface):
+        """The passes that show what the primary rays met."""
+        normal = np.zeros((len(hits), 3))
+        normal[met] = surface.shading.T
+        return {"depth": hits.t, "normal": normal, "position": hits.point,
+                "object_index": hits.object, "primitive_index": hits.primitive}
+
+    def _shade(self, wave, hits, met, surface):
+        """Add what rays see: the sky, or emission, ambient and local light."""
+        missed = np.flatnonzero(hits.primitive < 0)
+        if len(missed):
+            self._add(wave.pixel[missed], wave.weight[:, missed] * self._sky(wave.d[:, missed]))
+        if not len(met):
+            return
+        table, m = self.surfaces.table, surface.material
+        seen = table.emission[:, m] + self.ambient[:, None] * (table.ambient[m] * surface.base)
+        if self.lights:
+            from .shading import lit
+            key = None if wave.key is None else wave.key[met]
+            pixel = wave.pixel[met]
+            seen += lit(table, surface, wave.d[:, met], self.lights,
+                        lambda s, which, to, reach: self._transmitted(s, which, to, reach, pixel), key)
+        self._add(wave.pixel[met], wave.weight[:, met] * surface.alpha * seen)
+
+    def _add(self, pixel, radiance):
+        """Sum radiance into the pixels."""
+        n = self.radiance.shape[1]
+        for channel in range(3):
+            self.radiance[channel] += np.bincount(pixel, radiance[channel], minlength=n)
+
+    def _sky(self, d):
+        """Radiance of the surroundings."""
+        world = self.scene.world
+        colour = np.array(world.colour, float)[:, None]
+        if world.image is None:
+            return np.broadcast_to(colour, d.shape)
+        from .texture import surroundings
+        d = unit(d)
+        if world.rotation is not None:
+            d = np.stack([dot(row, d) for row in np.asarray(world.rotation, float)])
+        return colour * surroundings(world.image, d)
+
+    def _transmitted(self, surface, which, to, reach, pixel):
+        """Share of light that reaches the surfaces `which` from where `to` points; the shadow rays."""
+        point = surface.point[:, which]
+        o = pushed(point, surface.error[which], surface.normal[:, which], to)
+        # The ray starts beside the point, and must still end at the light.
+        d = to + (point - o) if math.isfinite(reach) else to
+        pixel = pixel[which]
+        if not self.coloured_shadows:
+            blocked, counts = self.probe["shadow"].occluded(o, d, reach)
+            self._count(SHADOW, pixel, np.count_nonzero(blocked), counts)
+            return 1.0 - blocked
+        from .shadows import filtered
+
+        def closest(which, o, d, t_max):
+            hits = self.probe["shadow"].closest(o, d, 0.0, t_max)
+            self._count(SHADOW, pixel[which], np.count_nonzero(hits.primitive >= 0),
+                        {name: getattr(hits, name) for name in COUNTED} if self.count else {})
+            return hits
+        return filtered(closest, self.surfaces, o, d, reach)
+
+    def _onward(self, wave, hits, met, surface):
+        """The waves of rays that the surfaces send on."""
+        waves = []
+        if not len(met):
+            return waves
+        if self.transparent:
+            # Going straight on is no bounce: a leaf's cut-out corner must not use up the depth.
+            share = np.broadcast_to(1.0 - surface.alpha, surface.base.shape)
+            waves.append(self._spawn(wave, met, surface, TRANSPARENT, wave.d[:, met], share,
+                                     wave.t_max[met] - hits.t[met]))
+        if self.bounces:
+            from .secondary import mirrored_and_refracted
+            table, m = self.surfaces.table, surface.material
+            sends = (table.mirror[m] > 0.0) | (table.mirror_base[m] > 0.0) | (table.transmission[m] > 0.0)
+            some = np.flatnonzero(sends & (wave.depth[met] < self.depth))
+            if len(some):
+                part = surface.take(some)
+                both = mirrored_and_refracted(table, part, wave.d[:, met[some]])
+                waves += [self._spawn(wave, met[some], part, kind, direction, weight, np.full(len(some), math.inf))
+                          for kind, (direction, weight) in zip((REFLECTED, REFRACTED), both)]
+        return [w for w in waves if len(w)]
+
+    @staticmethod
+    def _spawn(wave, met, surface, kind, direction, weight, t_max):
+        """Rays from surfaces, those with no weight left out."""
+        weight = wave.weight[:, met] * weight
+        which = np.flatnonzero((weight > 0.0).any(axis=0) & (t_max >= 0.0))
+        ray, direction = met[which], direction[:, which]
+        return Wave(pushed(surface.point[:, which], surface.error[which], surface.normal[:, which], direction),
+                    direction, t_max[which], weight[:, which], wave.pixel[ray],
+                    wave.depth[ray] + (kind != TRANSPARENT), np.full(len(ray), kind, np.uint8),
+                    None if wave.key is None else sampling.branch(wave.key[ray], kind))
