@@ -14,9 +14,9 @@ help:
 # Both scripts return at once when there is nothing to do.
 .PHONY: environment environment-4.5
 environment:
-	@tools/environment 3.13 .venv
+	@tools/environment .venv 3.13 3.11
 environment-4.5:
-	@tools/environment 3.11 .venv-4.5 || echo 'THE TESTS IN BPY 4.5 LTS WILL BE LEFT OUT'
+	@tools/environment .venv-4.5 3.11 || echo 'THE TESTS IN BPY 4.5 LTS WILL BE LEFT OUT'
 
 demo: environment
 	$(python) tools/demo.py
