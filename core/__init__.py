@@ -14,9 +14,9 @@ from importlib import import_module
 
 _WHERE = {
     "Scene": "scene.scene", "Object": "scene.scene", "Mesh": "scene.scene", "Shapes": "scene.scene",
-    "Camera": "scene.camera", "Light": "scene.light", "Material": "scene.material", "World": "scene.world",
+    "Camera": "scene.camera", "Light": "scene.light", "Material": "scene.material", "World": "scene.material",
     "build": "catalogue", "techniques": "catalogue", "technique": "catalogue",
-    "trace": "trace",
+    "trace": "rendering",
     "RayscopeError": "errors", "SceneError": "errors", "ParameterError": "errors",
     "MemoryEstimateError": "errors", "MissingPackageError": "errors", "Cancelled": "errors",
 }

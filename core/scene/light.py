@@ -46,3 +46,8 @@ class Light:
     shape: str = "rectangle"
     falloff: bool = True
     shadows: bool = True
+
+    @property
+    def has_extent(self):
+        """Whether its shadows have soft edges."""
+        return self.radius > 0.0 or self.kind == "area"

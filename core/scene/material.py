@@ -11,9 +11,9 @@ diffuse       (1 - m) (1 - w) C
 ambient       diffuse + m (1 - g) C: what a rough metal would reflect of the surroundings
 shininess n   2 / r^4 - 2, at most 4096 (Blinn-Phong exponent of a microfacet lobe of width r^2)
 specular      (F0 (1 - m) + m C) (n + 8) / 8, at most 64 (the lobe's normalisation)
-mirror        g ((1 - m) Fresnel(F0) + m C); Fresnel is the dielectric's reflectance, and 1 at
-              grazing incidence
-transmission  (1 - m) w C, times 1 - Fresnel
+mirror        g ((1 - m) F + m C); F is the dielectric's Fresnel reflectance by angle, shifted
+              to F0 at normal incidence, and 1 at grazing incidence
+transmission  (1 - m) w C, times 1 - F, at each surface that is passed
 emission      emission colour times strength
 alpha         alpha; the rest of the ray goes straight on
 ============  =========================================================================
@@ -77,6 +77,8 @@ class Material:
         Index of refraction.
     fresnel : bool
         Dielectric Fresnel equations share out `mirror` and `transmission` by angle; without, they are constants.
+    reflectance : float, optional
+        Reflectance at normal incidence (F0) where it is not that of `ior`; Fresnel's curve is shifted to start there.
     emission : tuple of float
     alpha : float
         Share of the ray that the surface stops; emission counts with it too.
@@ -98,6 +100,7 @@ class Material:
     transmission: float = 0.0
     ior: float = 1.45
     fresnel: bool = False
+    reflectance: float | None = None
     emission: tuple = (0.0, 0.0, 0.0)
     alpha: float = 1.0
     texture_alpha: bool = False
@@ -117,7 +120,26 @@ class Material:
         return cls(name, base=tuple(base), ambient=diffuse + metallic * (1.0 - gloss), diffuse=diffuse,
                    specular=reflectance * dielectric * lobe, specular_base=metallic * lobe, shininess=shininess,
                    mirror=mirror, mirror_base=metallic * gloss, transmission=dielectric * transmission,
-                   ior=ior, fresnel=True, emission=tuple(emission), alpha=alpha, **more)
+                   ior=ior, fresnel=True, reflectance=reflectance, emission=tuple(emission), alpha=alpha, **more)
+
+    def reflectance_at_normal(self):
+        """F0 of Fresnel's equations."""
+        return ((self.ior - 1.0) / (self.ior + 1.0)) ** 2 if self.reflectance is None else self.reflectance
+
+    @property
+    def reflects(self):
+        """Whether it sends on mirror rays."""
+        return self.mirror > 0.0 or self.mirror_base > 0.0 or self.refracts
+
+    @property
+    def refracts(self):
+        """Whether it sends on refracted rays."""
+        return self.transmission > 0.0
+
+    @property
+    def transparent(self):
+        """Whether rays may go straight on."""
+        return self.alpha < 1.0 or (self.texture_alpha and self.texture is not None)
 
 
 @dataclass

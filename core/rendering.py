@@ -1,0 +1,326 @@
+"""Tracing a picture: :func:`trace`, and :class:`Rendering` for those who want to watch it grow.
+
+Pictures are arrays whose row 0 is at the bottom, as in Blender.
+"""
+
+import math
+import os
+import time
+from dataclasses import dataclass, field
+from importlib import import_module
+
+import numpy as np
+
+from .catalogue import CORES, build, technique as technique_row
+from .errors import Cancelled, MemoryEstimateError, Notice, ParameterError, SceneError
+from .figures import PER_RAY, ray_figures
+from .parameters import Parameter, resolve
+from .scene.camera import check_size
+
+#: What can be set besides the techniques; panels and the command take their ranges from here.
+PARAMETERS = (
+    Parameter("depth", 5, "Reflections and refractions in a row, at most (H); 0 means local light alone", low=0, high=10_000),
+    Parameter("samples", 1, "Samples a pixel; 1 goes through the pixel's centre and gives hard shadows", low=1, high=1_000_000),
+    Parameter("seed", 0, "Chooses other random numbers", low=-2**31, high=2**31 - 1),
+)
+
+#: Pass -> (values a pixel, type, value where nothing was met). Blender's float passes have single precision.
+PASSES = {
+    "combined": (4, np.float32, 0.0),
+    "depth": (1, np.float32, math.inf),
+    "normal": (3, np.float32, 0.0),
+    "position": (3, np.float32, 0.0),
+    "object_index": (1, np.int32, -1),
+    "primitive_index": (1, np.int64, -1),
+    "rays_per_pixel": (1, np.int32, 0),
+    "n_it": (1, np.int64, 0),
+    "n_ts": (1, np.int64, 0),
+}
+COUNTED_PASSES = ("n_it", "n_ts")
+
+#: Share of the progress bar that building takes.
+BUILDING = 0.1
+#: Seconds between two calls of `progress`, at least: often enough to stop a run in time.
+INTERVAL = 0.03
+
+
+@dataclass
+class Result:
+    """A traced picture.
+
+    Attributes
+    ----------
+    image : ndarray, shape (h, w, 4), float32
+        Linear RGB and alpha, row 0 at the bottom. Alpha is 1 where the picture is done, and 0 outside the region and where
+        a cancelled run did not get to.
+    passes : dict of ndarray
+        With row 0 at the bottom, too:
+        ``combined`` (h, w, 4), the image, the mean of the samples;
+        from the first sample of each pixel, of the first surface met whatever its alpha: ``depth`` (h, w), along the
+        viewing axis, inf where nothing was met; ``normal`` (h, w, 3), the smooth unit normal on the viewer's side, and
+        ``position`` (h, w, 3), both 0 where nothing was met; ``object_index``, ``primitive_index`` (h, w), -1 where nothing was met;
+        summed over samples and all rays of the pixel: ``rays_per_pixel``, and where counted ``n_it``, ``n_ts`` (h, w).
+    figures : dict
+        ``T_B``: time to build the structures that were not given; ``T_R``: time to trace, s;
+        for ``primary``, ``reflected``, ``refracted``, ``transparent`` (straight on through alpha), ``shadow`` a dict: ``technique``, ``rays``,
+        ``hits``, and where counted ``N_IT``, ``N_TS``, ``N_ETS``, ``N_EETS`` per ray, ``r_ITM``. A shadow ray through glass counts
+        once for each stretch between two surfaces.
+    notices : list of Notice
+        What is amiss but did not stop the run.
+    structures : dict
+        ``primary``, ``secondary``, ``shadow``: the structures used, as far as such rays were needed.
+    cancelled : bool
+    """
+
+    image: np.ndarray
+    passes: dict
+    figures: dict = field(default_factory=dict)
+    notices: list = field(default_factory=list)
+    structures: dict = field(default_factory=dict)
+    cancelled: bool = False
+
+
+def trace(scene, technique="bvh", core="fast", size=(640, 480), depth=5, samples=1, seed=0, primary=None, shadow=None,
+          secondary=None, region=None, index=None, progress=None, on_tile=None, count=False, parameters=None):
+    """Trace a picture as Whitted (1980) did.
+
+    Parameters
+    ----------
+    scene : Scene
+        With a camera.
+    technique : str
+        Serves the rays that `primary`, `shadow` and `secondary` leave to it; see :func:`~rayscope.core.techniques`.
+    core : {"fast", "pure"}
+    size : (int, int)
+        Width and height in pixels.
+    depth : int
+        Reflections and refractions in a row, at most (H). Passing straight through a surface with alpha is none of them.
+    samples : int
+        Samples a pixel. With 1, rays go through the pixels' centres and lights cast hard shadows from their centres; with more,
+        both are chosen at random, by a hash of pixel, sample and seed.
+    seed : int
+    primary, shadow, secondary : str or (str, dict), optional
+        A technique, or one with its parameters, for camera rays; shadow rays; reflected, refracted and transparent rays.
+        The same technique with the same parameters is built once.
+    region : (int, int, int, int), optional
+        x0, y0, x1, y1 in pixels from the bottom left corner: only x0 <= x < x1, y0 <= y < y1 is traced.
+    index : Structure, optional
+        Used in place of `technique`: a structure built over this scene, in this core.
+    progress : callable, optional
+        Called as ``progress(fraction)`` every few ten milliseconds; stops the run by raising
+        :class:`~rayscope.core.errors.Cancelled`.
+    on_tile : callable, optional
+        Called as ``on_tile(x0, y0, x1, y1)`` when that part of the image holds a new sample. Tiles come from the centre
+        outwards; with several samples the whole picture gets one after the other.
+    count : bool
+        Also count intersection tests and traversal steps.
+    parameters : dict, optional
+        Of `technique`.
+
+    Returns
+    -------
+    Result
+        What was done when the run was stopped, too, once the structures were built.
+
+    Raises
+    ------
+    SceneError
+        Without a camera, for an impossible size or region.
+    ParameterError
+        For unknown names and values out of range.
+    MemoryEstimateError
+        When picture or structures would not fit into memory.
+    Cancelled
+        When stopped while structures were built.
+    """
+    rendering = Rendering(scene, technique, core, size, depth, samples, seed, primary, shadow, secondary, region, index,
+                          progress, count, parameters)
+    for tile in rendering.tiles():
+        if on_tile:
+            on_tile(*tile)
+    return rendering.result
+
+
+class Rendering:
+    """A picture in the making; parameters as of :func:`trace`.
+
+    The constructor checks everything and builds the structures; :meth:`tiles` traces. A thread may run it while another
+    reads ``result.image``.
+
+    Attributes
+    ----------
+    result : Result
+    """
+
+    def __init__(self, scene, technique="bvh", core="fast", size=(640, 480), depth=5, samples=1, seed=0, primary=None,
+                 shadow=None, secondary=None, region=None, index=None, progress=None, count=False, parameters=None):
+        if core not in CORES:
+            raise ParameterError(f"trace: there is no core {core!r}. Cores: {', '.join(CORES)}.")
+        values = resolve("trace", PARAMETERS, {"depth": depth, "samples": samples, "seed": seed}, core)
+        self.scene, self.core, self.count = scene, core, bool(count)
+        self.samples = values["samples"]
+        self.size = check_size(size)
+        if scene.camera is None:
+            raise SceneError(f"{scene.name}: there is no camera to see it from. Add one (in Blender: Add > Camera, "
+                             "then View > Cameras > Set Active Object as Camera).")
+        self.region = _check_region(region, self.size)
+        names = [name for name in PASSES if self.count or name not in COUNTED_PASSES]
+        self._progress, self._fraction, self._told = progress, 0.0, -math.inf
+        wanted = self._wanted(technique, parameters, primary, shadow, secondary, index, values["depth"])
+        passes = _framebuffer(self.size, names)
+        self.result = Result(passes["combined"], passes, notices=_notices(scene))
+        self._build(wanted, index)
+        tracer = import_module(f".{core}.tracing.whitted", __package__).Whitted
+        self._tracer = tracer(scene, self.result.structures, self.size, values["depth"], self.samples, values["seed"],
+                              self.count, self._check)
+
+    def _wanted(self, technique, parameters, primary, shadow, secondary, index, depth):
+        """Kind of ray -> (technique, its parameters), or None for `index`; only the kinds that the scene needs."""
+        if index is not None and hasattr(index, "closest_ray") != (self.core == "pure"):
+            raise ParameterError(f"trace: the structure given as index is not of the core {self.core!r}.")
+        if index is not None and parameters:
+            raise ParameterError("trace: parameters belong to a technique that is to be built, but index is built already.")
+        materials = self.scene.used_materials()
+        bounces = depth > 0 and any(m.reflects for m in materials)
+        needed = {"primary": (primary, True),
+                  "secondary": (secondary, bounces or any(m.transparent for m in materials)),
+                  "shadow": (shadow, any(light.shadows and any(light.colour) for light in self.scene.lights))}
+        wanted = {}
+        for kind, (choice, need) in needed.items():
+            if choice is None and index is not None:
+                wanted[kind] = None
+                continue
+            if choice is None or choice == technique:
+                choice = (technique, parameters or {})
+            name, given = (choice, {}) if isinstance(choice, str) else choice
+            row = technique_row(name)
+            if self.core not in row.cores:
+                raise ParameterError(f"{name} has no core {self.core!r}. It has: {', '.join(row.cores)}.")
+            wanted[kind] = name, resolve(name, row.parameters, given, self.core)
+            if need and kind not in row.rays:
+                raise ParameterError(f"{name} serves {' and '.join(row.rays)} rays only; name another technique for {kind} rays.")
+        return {kind: choice for kind, choice in wanted.items() if needed[kind][1]}
+
+    def _build(self, wanted, index):
+        """Build every different structure once."""
+        built = {}
+        keys = {kind: None if choice is None else (choice[0], tuple(sorted(choice[1].items())))
+                for kind, choice in wanted.items()}
+        todo = list(dict.fromkeys(k for k in keys.values() if k is not None))
+        for i, key in enumerate(todo):
+            def report(fraction, i=i):
+                self._fraction = BUILDING * (i + fraction) / len(todo)
+                self._check()
+            built[key] = build(self.scene, key[0], self.core, progress=report, **dict(key[1]))
+        self.result.structures = {kind: index if key is None else built[key] for kind, key in keys.items()}
+        self.result.figures["T_B"] = sum(s.figures["T_B"] for s in built.values())
+
+    def _check(self):
+        """Tell the progress, if it is time to."""
+        if self._progress is None:
+            return
+        now = time.perf_counter()
+        if now - self._told >= INTERVAL:
+            self._told = now
+            self._progress(min(self._fraction, 1.0))
+
+    def tiles(self):
+        """Trace, and yield (x0, y0, x1, y1) of each part of the image that holds a new sample.
+
+        Ends early, with ``result.cancelled`` set, when `progress` raises Cancelled.
+        """
+        began = time.perf_counter()
+        order = _tiles(self.region, self._tracer.tile_side)
+        x0, y0, x1, y1 = self.region
+        total, done = (x1 - x0) * (y1 - y0) * self.samples, 0
+        try:
+            for sample in range(self.samples):
+                for tile in order:
+                    self._fraction = BUILDING + (1.0 - BUILDING) * done / total
+                    self._check()
+                    self._keep(tile, sample, self._tracer.tile(*tile, sample))
+                    done += (tile[2] - tile[0]) * (tile[3] - tile[1])
+                    self._figures(began)
+                    yield tile
+            if self._progress:
+                self._progress(1.0)
+        except Cancelled:
+            self.result.cancelled = done < total
+            self._figures(began)
+
+    def _keep(self, tile, sample, values):
+        """Put a tile into the framebuffer."""
+        x0, y0, x1, y1 = tile
+        shape = (y1 - y0, x1 - x0)
+        for name, value in values.items():
+            target = self.result.passes[name][y0:y1, x0:x1]
+            value = np.asarray(value).reshape(*shape, *target.shape[2:-1], -1) if target.ndim == 3 else np.reshape(value, shape)
+            if name == "combined":
+                # The mean so far; a picture stopped now is complete.
+                target[..., :3] += (value - target[..., :3]) / (sample + 1)
+                target[..., 3] = 1.0
+            elif name in ("rays_per_pixel", *COUNTED_PASSES):
+                target += value.astype(target.dtype)
+            else:
+                with np.errstate(over="ignore"):
+                    target[...] = value
+
+    def _figures(self, began):
+        """Bring the figures up to date."""
+        figures = self.result.figures
+        figures["T_R"] = time.perf_counter() - began
+        for kind, tally in self._tracer.tally.items():
+            structure = self.result.structures.get(kind if kind in ("primary", "shadow") else "secondary")
+            row = {"technique": structure.technique.name if structure else None, "rays": tally["rays"], "hits": tally["hits"]}
+            if self.count:
+                row |= ray_figures(*(tally[name] for name in PER_RAY), tally["rays"], tally["hits"])
+            figures[kind] = row
+
+
+def _check_region(region, size):
+    """The region, or the whole picture."""
+    width, height = size
+    if region is None:
+        return 0, 0, width, height
+    try:
+        x0, y0, x1, y1 = (int(v) for v in region)
+    except (TypeError, ValueError):
+        raise SceneError(f"Region: four whole numbers are needed, x0, y0, x1, y1, not {region!r}.") from None
+    if not (0 <= x0 < x1 <= width and 0 <= y0 < y1 <= height):
+        raise SceneError(f"Region: {x0}, {y0}, {x1}, {y1} is empty or reaches out of the picture of {width} x {height} pixels.")
+    return x0, y0, x1, y1
+
+
+def _framebuffer(size, names):
+    """The passes, empty."""
+    width, height = size
+    need = width * height * sum(PASSES[n][0] * np.dtype(PASSES[n][1]).itemsize for n in names)
+    there = _memory()
+    if need > 0.75 * there:
+        raise MemoryEstimateError(f"Picture of {width} x {height} pixels: its passes would take {need / 2**30:.1f} GiB of the "
+                                  f"{there / 2**30:.1f} GiB of memory; choose a smaller resolution.")
+    return {name: np.full((height, width) if k == 1 else (height, width, k), empty, dtype)
+            for name, (k, dtype, empty) in ((n, PASSES[n]) for n in names)}
+
+
+def _memory():
+    """Bytes of memory that there are, or infinity where the system does not tell."""
+    try:
+        return os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
+    except (AttributeError, ValueError, OSError):
+        return math.inf
+
+
+def _notices(scene):
+    """What is amiss with a scene that shall be traced."""
+    if any(any(light.colour) for light in scene.lights):
+        return []
+    return [Notice(scene.name, "no light shines; the picture shows emission, ambient light and the surroundings alone. "
+                   "Add a light (in Blender: Add > Light).")]
+
+
+def _tiles(region, side):
+    """Tiles of a region, from the centre outwards."""
+    x0, y0, x1, y1 = region
+    tiles = [(x, y, min(x + side, x1), min(y + side, y1)) for y in range(y0, y1, side) for x in range(x0, x1, side)]
+    return sorted(tiles, key=lambda t: math.hypot(t[0] + t[2] - x0 - x1, t[1] + t[3] - y0 - y1))
