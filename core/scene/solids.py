@@ -240,6 +240,12 @@ def _placed(objects, shapes):
     return Placed(solids, matrix, origin, inverse, index[:, 0].astype(np.int32), index[:, 1])
 
 
+def _determinant(m):
+    """Determinants of 3 x 3 matrices, shape (3, 3, n)."""
+    cofactors = _cofactors(m)
+    return m[0, 0] * cofactors[0, 0] + m[0, 1] * cofactors[0, 1] + m[0, 2] * cofactors[0, 2]
+
+
 def _scaled(matrix):
     """The matrices with every column scaled by a power of two to a largest entry in [0.5, 1), and the exponents."""
     exponent = np.frexp(np.abs(matrix).max(axis=0))[1]
@@ -255,21 +261,78 @@ def _cofactors(m):
 def _inverse(matrix):
     """Inverses of 3 x 3 matrices, shape (3, 3, n)."""
     scaled, exponent = _scaled(matrix)
-    cofactors = _cofactors(scaled)
-    det = scaled[0, 0] * cofactors[0, 0] + scaled[0, 1] * cofactors[0, 1] + scaled[0, 2] * cofactors[0, 2]
-    return np.ldexp(np.swapaxes(cofactors, 0, 1) / det, -exponent[:, None])
+    return np.ldexp(np.swapaxes(_cofactors(scaled), 0, 1) / _determinant(scaled), -exponent[:, None])
 
 
 def _usable(kind, placed):
     """Bool per solid: whether it can be traced."""
     finite = np.isfinite(placed.matrix).all(axis=(0, 1)) & np.isfinite(placed.origin).all(axis=0)
-    if KINDS[kind].hull is None and kind != "sphere":
-        return finite & np.array([not polygon_fault(s.values["points"]) for s in placed.solids])
     with np.errstate(all="ignore"):
-        scaled, _ = _scaled(placed.matrix)
-        cofactors = _cofactors(scaled)
-        det = sum(scaled[0, c] * cofactors[0, c] for c in range(3))
+        if kind in ("polygon", "triangle"):
+            return finite & Corners.of(placed).planar()
+        det = _determinant(_scaled(placed.matrix)[0])
     return finite & (np.abs(det) > SINGULAR) & np.isfinite(placed.inverse).all(axis=(0, 1))
+
+
+@dataclass
+class Corners:
+    """Corners of polygons in world space, one polygon after the other.
+
+    Attributes
+    ----------
+    start : ndarray, shape (n + 1,)
+        The corners of polygon i are start[i] to start[i + 1].
+    xyz : ndarray, shape (3, corners)
+    following : ndarray, shape (corners,)
+        The corner after each one.
+    normal, anchor : ndarray, shape (3, n)
+        Planes: unit normals by Newell's method, which follow the winding whatever corner comes first (0 for polygons
+        without area), turned round where the matrix mirrors; and the mean of the corners.
+    """
+
+    start: np.ndarray
+    xyz: np.ndarray
+    following: np.ndarray
+    normal: np.ndarray
+    anchor: np.ndarray
+
+    @classmethod
+    def of(cls, placed):
+        """The corners of placed polygons; fewer than three count as three at one point."""
+        points = [s.values["points"] for s in placed.solids]
+        points = [p if len(p) >= 3 else np.zeros((3, 3)) for p in points]
+        count = np.array([len(p) for p in points], np.int64)
+        start = np.concatenate([[0], np.cumsum(count)])
+        first = start[:-1]
+        owner = np.repeat(np.arange(len(count)), count)
+        local, m = np.concatenate(points).T, placed.matrix
+        xyz = np.stack([m[r, 0, owner] * local[0] + m[r, 1, owner] * local[1] + m[r, 2, owner] * local[2]
+                        + placed.origin[r, owner] for r in range(3)])
+        following = np.arange(len(owner)) + 1
+        following[start[1:] - 1] = first
+        anchor = np.add.reduceat(xyz, first, axis=1) / count
+        p = xyz - anchor[:, owner]
+        scale = np.maximum.reduceat(np.abs(p).max(axis=0), first)
+        p /= np.where(scale > 0.0, scale, 1.0)[owner]
+        q = p[:, following]
+        normal = np.stack([np.add.reduceat((p[a] - q[a]) * (p[b] + q[b]), first) for a, b in ((1, 2), (2, 0), (0, 1))])
+        length = np.sqrt((normal * normal).sum(axis=0))
+        # A long thin polygon's area is small, but nothing like the rounding of its products.
+        flat = ~(length > 64 * 2.0**-53 * count)
+        mirror = np.where(_determinant(m) < 0.0, -1.0, 1.0)
+        return cls(start, xyz, following, np.where(flat, 0.0, normal / np.where(flat, 1.0, length) * mirror), anchor)
+
+    def off_plane(self):
+        """How far the corners lie off the planes at most, and the polygons' sizes."""
+        owner = np.repeat(np.arange(len(self.start) - 1), np.diff(self.start))
+        p, first = self.xyz - self.anchor[:, owner], self.start[:-1]
+        off = np.maximum.reduceat(np.abs((p * self.normal[:, owner]).sum(axis=0)), first)
+        return off, np.maximum.reduceat(np.abs(p).max(axis=0), first)
+
+    def planar(self):
+        """Bool per polygon: whether it has an area, in one plane."""
+        off, size = self.off_plane()
+        return self.normal.any(axis=0) & (off <= NOT_PLANAR * size)
 
 
 def faults(objects):
@@ -303,44 +366,26 @@ def _fault(placed, at):
     if not (np.isfinite(matrix).all() and np.isfinite(placed.origin[:, at]).all()):
         return f"{solid.kind}: its matrix holds NaN or infinite numbers"
     if "points" in solid.values:
-        return f"{solid.kind}: {polygon_fault(solid.values['points'])}"
+        return f"{solid.kind}: {_polygon_fault(placed, at)}"
     flat = [axis for axis, size in zip("xyz", np.abs(matrix).max(axis=0)) if size == 0.0]
     if flat:
         return f"{solid.kind}: its size (radius, length) is zero along its own {' and '.join(flat)}"
     return f"{solid.kind}: its matrix is singular, it is squashed flat or nearly so"
 
 
-def polygon_fault(points):
-    """What is wrong with a polygon's corners, or an empty string."""
+def _polygon_fault(placed, at):
+    """What is wrong with one of placed polygons."""
+    points = placed.solids[at].values["points"]
     if not np.isfinite(points).all():
         return "a corner is NaN or infinite"
     distinct = len({tuple(p) for p in points.tolist()})
     if distinct < 3:
         return f"it has {distinct} distinct corner{'s' if distinct != 1 else ''}, three are needed"
-    normal, anchor = polygon_plane(points)
-    if not normal.any():
-        return "its corners lie on one line"
-    size = np.ptp(points, axis=0).max()
-    off = np.abs((points - anchor) @ normal).max()
-    if off > NOT_PLANAR * size:
-        return f"it is not planar: a corner is {off:.3g} off its plane ({off / size:.1%} of its size); divide it into triangles"
-    return ""
-
-
-def polygon_plane(points):
-    """Unit normal (Newell's, 0 for a polygon without area) and one point of a polygon's plane.
-
-    The point is the mean of the corners; the normal follows the winding, whatever corner comes first.
-    """
-    anchor = points.mean(axis=0)
-    scale = np.abs(points - anchor).max() or 1.0
-    p = (points - anchor) / scale
-    q = np.roll(p, -1, axis=0)
-    normal = np.array([((p[:, 1] - q[:, 1]) * (p[:, 2] + q[:, 2])).sum(), ((p[:, 2] - q[:, 2]) * (p[:, 0] + q[:, 0])).sum(),
-                       ((p[:, 0] - q[:, 0]) * (p[:, 1] + q[:, 1])).sum()])
-    length = math.hypot(*normal)
-    # A long thin polygon's area is small, but nothing like the rounding of its products.
-    return (normal / length if length > 64 * 2.0**-53 * len(points) else np.zeros(3)), anchor
+    corners = Corners.of(placed)
+    if not corners.normal[:, at].any():
+        return "its corners lie on one line, or its matrix puts them there"
+    off, size = (float(x[at]) for x in corners.off_plane())
+    return f"it is not planar: a corner is {off:.3g} off its plane ({off / size:.1%} of its size); divide it into triangles"
 
 
 def bounds(solid):

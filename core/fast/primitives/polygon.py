@@ -1,0 +1,211 @@
+"""Planar polygons, convex or not, with holes by bridges.
+
+Inside is decided by the crossing rule, in the sheared space of the watertight triangle test: there the ray runs along
+an axis, and neighbours see the same corners, so that a ray can neither slip between two polygons nor meet both where
+one ends. What lies exactly on an edge is hit.
+"""
+
+import numpy as np
+
+from ...scene.solids import Corners
+from .solids import EPSILON, dot
+from .triangle import Triangles
+
+#: Edges looked at together.
+EDGES = 1 << 18
+
+
+def triangles(placed):
+    """Polygons of three corners are triangles like those of a mesh."""
+    corners = Corners.of(placed)
+    m = placed.matrix
+    minor = [m[1, (c + 1) % 3] * m[2, (c + 2) % 3] - m[1, (c + 2) % 3] * m[2, (c + 1) % 3] for c in range(3)]
+    flip = m[0, 0] * minor[0] + m[0, 1] * minor[1] + m[0, 2] * minor[2] < 0.0
+    xyz = np.concatenate([corners.xyz[:, k::3] for k in range(3)])
+    return Triangles(xyz, placed.object_of, placed.primitive_of, flip)
+
+
+class Polygons:
+    """n polygons in world space.
+
+    Attributes
+    ----------
+    corners : Corners
+    lo, hi : ndarray, shape (n, 3)
+    object_of, primitive_of : ndarray, shape (n,)
+    """
+
+    KIND = "polygon"
+
+    def __init__(self, placed):
+        self.n = len(placed.solids)
+        self.corners = Corners.of(placed)
+        self.object_of, self.primitive_of = placed.object_of, placed.primitive_of
+        first, xyz = self.corners.start[:-1], self.corners.xyz
+        self.lo, self.hi = np.minimum.reduceat(xyz, first, axis=1).T, np.maximum.reduceat(xyz, first, axis=1).T
+        # The plane's two axes for u and v: where the normal is least.
+        self.axes = np.stack([np.abs(self.corners.normal).argmax(axis=0) + k for k in (1, 2)]) % 3
+
+    def bounds(self):
+        """World boxes (lo, hi), each of shape (n, 3)."""
+        return self.lo, self.hi
+
+    def _hits(self, rays, ray, item, t_far):
+        """Pairs that hit, and where."""
+        normal, anchor = self.corners.normal, self.corners.anchor
+        o, d = rays.o, rays.d
+        n = [normal[a].take(item) for a in range(3)]
+        with np.errstate(all="ignore"):
+            away = dot(n, [anchor[a].take(item) - o[a].take(ray) for a in range(3)])
+            t = away / dot(n, [d[a].take(ray) for a in range(3)])
+        pair = np.flatnonzero((t >= rays.t_min.take(ray)) & (t <= t_far.take(ray)) & (np.abs(t) < np.inf))
+        pair = pair[self._inside(*self._sheared(rays, ray[pair]), item[pair])]
+        return pair, t[pair]
+
+    @staticmethod
+    def _sheared(rays, ray):
+        """Axes, origins and shears of rays, as :meth:`_inside` wants them."""
+        axes, origin, s = rays.shear
+        return axes[:, ray], origin[:, ray], s[0].take(ray), s[1].take(ray)
+
+    def _inside(self, axes, origin, sx, sy, item):
+        """Bool per line: whether it passes through the polygon, or through its edge.
+
+        The line goes through `origin` (its coordinates in the order of `axes`) along the direction (sx, sy, 1).
+        """
+        inside = np.zeros(len(item), bool)
+        count = np.diff(self.corners.start)[item]
+        total = np.cumsum(count)
+        begin = 0
+        while begin < len(item):
+            end = max(begin + 1, int(np.searchsorted(total, (total[begin - 1] if begin else 0) + EDGES, side="right")))
+            some = slice(begin, end)
+            inside[some] = self._crossing(axes[:, some], origin[:, some], sx[some], sy[some], item[some], count[some])
+            begin = end
+        return inside
+
+    def _crossing(self, axes, origin, sx, sy, item, count):
+        """The crossing rule, for some lines."""
+        first = np.concatenate([[0], np.cumsum(count)[:-1]])
+        line = np.repeat(np.arange(len(item)), count)
+        corner = np.arange(len(line)) + np.repeat(self.corners.start[item] - first, count)
+        following = np.arange(1, len(line) + 1)
+        following[first + count - 1] = first
+        flat, total = self.corners.xyz.ravel(), self.corners.xyz.shape[1]
+        x, y, z = (flat.take(axes[k].take(line) * total + corner) - origin[k].take(line) for k in range(3))
+        x -= sx.take(line) * z
+        y -= sy.take(line) * z
+        x1, y1 = x.take(following), y.take(following)
+        side = x * y1 - x1 * y
+        # Edges that cross the positive x axis, each corner belonging to one of its two edges.
+        up, up1 = y > 0.0, y1 > 0.0
+        crosses = (up != up1) & ((side > 0.0) == up1) & (side != 0.0)
+        on = (side == 0.0) & (np.minimum(y, y1) <= 0.0) & (np.maximum(y, y1) >= 0.0) & (np.minimum(x, x1) <= 0.0) & (np.maximum(x, x1) >= 0.0)
+        # One number an edge: even for none, odd for a crossing, large for the edge itself.
+        sums = np.add.reduceat(crosses + (on.astype(np.int64) << 32), first) if len(first) else np.zeros(0, np.int64)
+        return (sums & 1 == 1) | (sums >> 32 > 0)
+
+    def intersect(self, rays, ray, item, t_far):
+        """Nearest hits of pairs; see the package's interface."""
+        pair, t = self._hits(rays, ray, item, t_far)
+        ray, item = ray[pair], item[pair]
+        place = np.stack([rays.o[a].take(ray) + t * rays.d[a].take(ray) for a in range(3)])
+        low, size = self.lo.T[:, item], (self.hi - self.lo).T[:, item]
+        i = np.arange(len(item))
+        u, v = ((place[a, i] - low[a, i]) / np.where(size[a, i] > 0.0, size[a, i], 1.0) for a in self.axes[:, item])
+        return pair, t, u, v, np.zeros(len(pair), np.int64)
+
+    def blocks(self, rays, ray, item, t_far):
+        """The pairs that hit."""
+        return self._hits(rays, ray, item, t_far)[0]
+
+    def surface(self, rays, item, t, u, v, detail):
+        """Object, primitive, part, normal, point and error of hits, one a ray."""
+        normal, anchor = self.corners.normal[:, item], self.corners.anchor[:, item]
+        p = rays.o + t * rays.d
+        p = p - normal * dot(normal, p - anchor)
+        # Not beyond the polygon's box, where the ray met it edge-on.
+        point = np.minimum(np.maximum(p.T, self.lo[item]), self.hi[item])
+        error = 16 * EPSILON * (np.abs(p) + np.abs(anchor)).max(axis=0)
+        return self.object_of[item], self.primitive_of[item], np.zeros(len(item), np.int32), normal.T, point, error
+
+    def support(self, item, axis):
+        """Exact extents (d, D) along the directions `axis`, shape (m, 3)."""
+        line, corner, first = self._corners_of(item)
+        a, xyz = axis.T[:, line], self.corners.xyz[:, corner]
+        along = xyz[0] * a[0] + xyz[1] * a[1] + xyz[2] * a[2]
+        return np.minimum.reduceat(along, first), np.maximum.reduceat(along, first)
+
+    def _corners_of(self, item):
+        """The corners of polygons one after the other: which of `item`, which corner, and where each one's begin."""
+        count = np.diff(self.corners.start)[item]
+        first = np.concatenate([[0], np.cumsum(count)[:-1]])
+        line = np.repeat(np.arange(len(item)), count)
+        return line, np.arange(len(line)) + np.repeat(self.corners.start[item] - first, count), first
+
+    def overlaps(self, item, lo, hi):
+        """Bool per pair: whether the polygon touches the box."""
+        own_lo, own_hi = self.clip(item, lo, hi)
+        return (own_lo <= own_hi).all(axis=1)
+
+    def clip(self, item, lo, hi):
+        """Boxes of the parts of polygons inside boxes.
+
+        Such a part's corners are the ends of the polygon's edges cut by the box, and the points of the polygon where
+        the box's edges meet its plane.
+        """
+        low, high = np.full((len(item), 3), np.inf), np.full((len(item), 3), -np.inf)
+        at = np.flatnonzero(((self.lo[item] <= hi) & (self.hi[item] >= lo)).all(axis=1))
+        if not len(at):
+            return low, high
+        item, lo, hi = item[at], lo[at], hi[at]
+        size = np.maximum(np.maximum(np.abs(lo), np.abs(hi)), np.maximum(np.abs(self.lo[item]), np.abs(self.hi[item])))
+        slack = 64 * EPSILON * size.max(axis=1, keepdims=True)
+        for part_lo, part_hi in (self._cut_edges(item, lo - slack, hi + slack), self._box_edges(item, lo - slack, hi + slack)):
+            low[at], high[at] = np.minimum(low[at], part_lo), np.maximum(high[at], part_hi)
+        low[at], high[at] = np.maximum(low[at] - slack, lo), np.minimum(high[at] + slack, hi)
+        return low, high
+
+    def _cut_edges(self, item, lo, hi):
+        """Boxes of what the boxes leave of the polygons' edges."""
+        line, corner, first = self._corners_of(item)
+        p = self.corners.xyz[:, corner]
+        e = self.corners.xyz[:, self.corners.following[corner]] - p
+        t_in, t_out = np.zeros(len(line)), np.ones(len(line))
+        with np.errstate(all="ignore"):
+            for a in range(3):
+                low, high = lo[line, a] - p[a], hi[line, a] - p[a]
+                level = e[a] == 0.0
+                one, other = low / e[a], high / e[a]
+                t_in = np.where(level, np.where((low <= 0.0) & (high >= 0.0), t_in, np.inf), np.fmax(t_in, np.fmin(one, other)))
+                t_out = np.where(level, t_out, np.fmin(t_out, np.fmax(one, other)))
+            outside = ~(t_in <= t_out)
+            ends = np.stack([p + t_in * e, p + t_out * e])
+        low = np.where(outside, np.inf, ends.min(axis=0))
+        high = np.where(outside, -np.inf, ends.max(axis=0))
+        return np.minimum.reduceat(low, first, axis=1).T, np.maximum.reduceat(high, first, axis=1).T
+
+    def _box_edges(self, item, lo, hi):
+        """Boxes of the polygons' points on edges of the boxes."""
+        n, anchor = self.corners.normal[:, item].T, self.corners.anchor[:, item].T
+        low, high = np.full(lo.shape, np.inf), np.full(lo.shape, -np.inf)
+        kz = np.abs(n).argmax(axis=1)
+        i = np.arange(len(item))
+        for axis in range(3):
+            b, c = (axis + 1) % 3, (axis + 2) % 3
+            for at_b in (lo[:, b], hi[:, b]):
+                for at_c in (lo[:, c], hi[:, c]):
+                    point = np.empty(lo.shape)
+                    point[:, b], point[:, c] = at_b, at_c
+                    with np.errstate(all="ignore"):
+                        rest = n[:, b] * (at_b - anchor[:, b]) + n[:, c] * (at_c - anchor[:, c])
+                        point[:, axis] = anchor[:, axis] - rest / n[:, axis]
+                    cut = np.flatnonzero((point[:, axis] >= lo[:, axis]) & (point[:, axis] <= hi[:, axis]))
+                    if not len(cut):
+                        continue
+                    # Looked at along the axis nearest to the normal.
+                    axes = np.stack([kz[cut] + 1, kz[cut] + 2, kz[cut]]) % 3
+                    zero = np.zeros(len(cut))
+                    cut = cut[self._inside(axes, point[cut].T[axes, np.arange(len(cut))], zero, zero, item[cut])]
+                    low[cut], high[cut] = np.minimum(low[cut], point[cut]), np.maximum(high[cut], point[cut])
+        return low, high
