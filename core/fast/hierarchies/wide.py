@@ -23,6 +23,10 @@ CHUNK = 16_384
 #: Leaf pairs collected before they are tested.
 LEAVES = 8_192
 
+#: Levels of the packed tree at which a ray's nearest child is taken up before the others. Measured: below, finding the
+#: nearest costs more than it saves, because boxes are small and a whole chunk is done before the next.
+ORDERED_LEVELS = 3
+
 LINES = 8
 CHILD = 6
 
@@ -202,9 +206,12 @@ class _Octant:
             self.push(level + 1, ray, child.astype(np.int64), near)
 
     def push(self, level, ray, node, entry):
-        """Put pairs on a level, the nearest child of every ray on top."""
+        """Put pairs on a level, at the upper levels with the nearest child of every ray on top."""
         if level == len(self.levels):
             self.levels.append([])
+        if level > ORDERED_LEVELS:
+            self.levels[level].append((ray, node, entry))
+            return
         # Pairs of one ray and parent stand together; the nearest of them is the one with the least entry.
         first = np.flatnonzero(np.concatenate([[True], ray[1:] != ray[:-1]]))
         nearest = np.minimum.reduceat(entry, first)
