@@ -1,7 +1,5 @@
 """Blender's camera -> the core's: its window, from lens, sensor, shift and pixel shape."""
 
-import math
-
 import numpy as np
 
 from ...core.scene.camera import Camera
@@ -70,7 +68,7 @@ def camera_from_view(region_data):
     Returns
     -------
     Camera
-        Its window has the viewport's proportions.
+        Its window has the viewport's proportions. An orthographic view reaches as far behind its plane as before it.
     """
     p = np.array(region_data.window_matrix, float)
     perspective = p[3, 2] != 0.0
@@ -81,8 +79,5 @@ def camera_from_view(region_data):
     else:
         sides = [(s - p[i, 3]) / p[i, i] for i in (0, 1) for s in (-1.0, 1.0)]
         near, far = (p[2, 3] + 1.0) / p[2, 2], (p[2, 3] - 1.0) / p[2, 2]
-    if not perspective or not far > near:                                 # orthographic views reach behind their plane
-        near = near if not perspective else 0.0
-        far = far if far > near else math.inf
     return Camera(np.linalg.inv(np.array(region_data.view_matrix, float)), tuple(sides),
                   "perspective" if perspective else "orthographic", float(near), float(far), "View")

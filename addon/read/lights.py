@@ -34,13 +34,15 @@ def read_light(obj, matrix, notices):
         return _area(obj.name, lamp, matrix, power, common, notices)
     if lamp.type == "SUN":
         radius = math.tan(lamp.angle / 2.0)
-        # Without normalisation the strength is the disk's radiance.
-        scale = 1.0 if lamp.normalize else math.pi * radius * radius
+        # Without normalisation the strength is the radiance of the disk in the sky.
+        scale = 1.0 if lamp.normalize else math.pi * math.sin(lamp.angle / 2.0) ** 2
         return Light(obj.name, "sun", _triple(power * scale), radius=radius, **common)
     radius = lamp.shadow_soft_size
-    scale = 1.0 / (4.0 * math.pi)
-    if not lamp.normalize and radius > 0.0:
-        scale *= math.pi * radius * radius                                # the power is then that of a disk of area 1
+    if lamp.normalize:
+        scale = 1.0 / (4.0 * math.pi)
+    else:
+        # The sphere's surface then has the radiance P / pi, whatever its size; Cycles takes an area of 1 for a point.
+        scale = radius * radius if radius > 0.0 else 1.0 / math.pi
     if lamp.type == "SPOT":
         return Light(obj.name, "spot", _triple(power * scale), radius=radius, spot_angle=lamp.spot_size,
                      spot_blend=lamp.spot_blend, **common)
