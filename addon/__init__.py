@@ -1,9 +1,19 @@
 """Everything that knows Blender."""
 
 
+def _parts():
+    """In the order of registration: operators and panels use the properties, and panels name the engine."""
+    from . import command, engine
+    from .show import overlay
+    from .ui import handlers, operators, panels, properties
+    return properties, engine, operators, panels, overlay, handlers, command
+
+
 def register():
-    pass
+    for part in _parts():
+        part.register()
 
 
 def unregister():
-    pass
+    for part in reversed(_parts()):
+        part.unregister()

@@ -1,0 +1,160 @@
+"""The render engine: F12, animations, `blender -b file.blend -E RAYSCOPE -f 1`, and the viewport's rendered mode."""
+
+import bpy
+import numpy as np
+
+from . import tasks
+from .show import preview
+from ..core.errors import Cancelled, RayscopeError
+
+ENGINE = "RAYSCOPE"
+
+#: Depth where nothing is seen, as in Cycles.
+FAR_AWAY = 1e10
+
+#: Cycles' names of its standard passes, and whether the view layer wants them: (name, channels, type, property, array of the trace).
+BUILT_IN = (
+    ("Depth", "Z", "VALUE", "use_pass_z", "depth"),
+    ("Position", "XYZ", "VECTOR", "use_pass_position", "position"),
+    ("Normal", "XYZ", "VECTOR", "use_pass_normal", "normal"),
+    ("IndexOB" if bpy.app.version < (5, 0) else "Object Index", "X", "VALUE", "use_pass_object_index", "pass_index"),
+)
+#: Our own: (name, setting that asks for it, array of the trace).
+OWN = (("Rayscope Object", "index_passes", "object_index"), ("Rayscope Primitive", "index_passes", "primitive_index"),
+       ("N_IT", "count", "n_it"), ("N_TS", "count", "n_ts"), ("Rays per Pixel", "count", "rays_per_pixel"))
+
+
+def passes_of(scene, view_layer):
+    """The passes that a view layer has besides Combined: (name, channels, type, array of the trace)."""
+    for name, channels, kind, wanted, array in BUILT_IN:
+        if getattr(view_layer, wanted):
+            yield name, channels, kind, array
+    for name, wanted, array in OWN:
+        if getattr(scene.rayscope, wanted):
+            yield name, "X", "VALUE", array
+
+
+class RayscopeRenderEngine(bpy.types.RenderEngine):
+    bl_idname = ENGINE
+    bl_label = "Rayscope"
+    bl_use_preview = False
+    bl_use_shading_nodes_custom = False  # the materials are Blender's own nodes
+    bl_use_eevee_viewport = True
+    bl_use_postprocess = True
+
+    _preview = None
+
+    def update_render_passes(self, scene=None, renderlayer=None):
+        self.register_pass(scene, renderlayer, "Combined", 4, "RGBA", "COLOR")
+        for name, channels, kind, _ in passes_of(scene, renderlayer):
+            self.register_pass(scene, renderlayer, name, len(channels), channels, kind)
+
+    def render(self, depsgraph):
+        try:
+            self._render(depsgraph)
+        except Cancelled:
+            pass
+        except RayscopeError as error:
+            self._fail(str(error))
+        except MemoryError:
+            self._fail("There was not enough memory: make the picture smaller, or render with fewer passes.")
+
+    def _fail(self, text):
+        self.report({"ERROR"}, text)
+        self.error_set(text)
+
+    def _render(self, depsgraph):
+        scene, layer = depsgraph.scene, depsgraph.view_layer
+        passes = list(passes_of(scene, layer))
+        self.update_stats("", "Reading the scene")
+        region = border_of(scene)
+        task = tasks.Trace(depsgraph, self.camera_override, region)
+        for notice in task.scene.notices:
+            print(f"Rayscope: {notice}")
+        pass_index = np.array([_pass_index(depsgraph, o.name) for o in task.scene.objects] + [0], np.float32)  # -1, nothing, takes the last
+        left, bottom = region[:2] if region else (0, 0)
+
+        def write(x0, y0, x1, y1):
+            part = np.s_[y0:y1, x0:x1]
+            result = self.begin_result(x0 - left, y0 - bottom, x1 - x0, y1 - y0, layer=layer.name)
+            target = result.layers[0].passes
+            target["Combined"].rect.foreach_set(_flat(task.result.image[part]))
+            for name, _, _, array in passes:
+                values = task.result.passes["object_index" if array == "pass_index" else array][part]
+                if array == "pass_index":
+                    values = pass_index[values]
+                elif array == "depth":
+                    values = np.where(np.isfinite(values), values, FAR_AWAY)
+                target[name].rect.foreach_set(_flat(values))
+            self.end_result(result)
+
+        def progress(fraction):
+            self.update_progress(fraction)
+            if self.test_break():
+                raise Cancelled("Rendering was stopped.")
+
+        self.update_stats("", f"{scene.rayscope.row().label}, {task.scene.n_primitives:,} primitives")
+        try:
+            task(progress, write)
+        finally:
+            if task.result is not None:
+                task.keep()
+
+    def view_update(self, context, depsgraph):
+        if self._preview is None:
+            self._preview = preview.Preview()
+        self._preview.scene_changed()
+
+    def view_draw(self, context, depsgraph):
+        if self._preview is None:
+            self._preview = preview.Preview()
+        self._preview.draw(self, context, depsgraph)
+
+    def __del__(self):
+        if self._preview is not None:
+            self._preview.stop()
+
+
+def border_of(scene):
+    """The part of the picture that is rendered, in pixels: x0, y0, x1, y1; None for all of it. Truncated as Blender does."""
+    render = scene.render
+    if not render.use_border:
+        return None
+    width, height = tasks.picture_size(scene)
+    return (int(render.border_min_x * width), int(render.border_min_y * height), int(render.border_max_x * width), int(render.border_max_y * height))
+
+
+def _pass_index(depsgraph, name):
+    """The pass index of an object, 0 where there is none of that name."""
+    obj = depsgraph.scene.objects.get(name)
+    return obj.pass_index if obj else 0
+
+
+def _flat(array):
+    return np.ascontiguousarray(array, np.float32).ravel()
+
+
+#: Panels of other engines that show what we use, by class name; those with BLENDER_RENDER in their list come besides.
+MORE_PANELS = {"EEVEE_MATERIAL_PT_context_material", "EEVEE_MATERIAL_PT_surface", "MATERIAL_PT_preview", "DATA_PT_EEVEE_light", "EEVEE_WORLD_PT_surface"}
+#: DATA_PT_light would be a second Light panel; filters and their passes are not ours.
+NOT_OURS = {"VIEWLAYER_PT_filter", "VIEWLAYER_PT_layer_passes", "DATA_PT_light"}
+
+
+def _panels():
+    for panel in bpy.types.Panel.__subclasses__():
+        engines = getattr(panel, "COMPAT_ENGINES", None)
+        if engines is not None and panel.__name__ not in NOT_OURS and ("BLENDER_RENDER" in engines or panel.__name__ in MORE_PANELS):
+            yield engines
+
+
+def register():
+    bpy.utils.register_class(RayscopeRenderEngine)
+    for engines in _panels():
+        engines.add(ENGINE)
+
+
+def unregister():
+    preview.stop_all()
+    for panel in bpy.types.Panel.__subclasses__():
+        getattr(panel, "COMPAT_ENGINES", set()).discard(ENGINE)
+    bpy.utils.unregister_class(RayscopeRenderEngine)

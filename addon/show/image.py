@@ -1,0 +1,53 @@
+"""A traced picture as an image datablock."""
+
+import bpy
+import numpy as np
+
+NAME = "Rayscope"
+
+
+def image_of(width, height):
+    """The image that traces go into, in this size; made where there is none. It keeps high dynamic range."""
+    image = bpy.data.images.get(NAME)
+    if image is not None and (image.source != "GENERATED" or not image.is_float):
+        image = None  # somebody else's: Blender names ours Rayscope.001
+    if image is None:
+        image = bpy.data.images.new(NAME, width, height, alpha=True, float_buffer=True)
+        image.use_fake_user = False
+    elif tuple(image.size) != (width, height):
+        image.scale(width, height)
+    return image
+
+
+def put(pixels):
+    """Copy a picture into the image and have its editors drawn again.
+
+    Parameters
+    ----------
+    pixels : ndarray, shape (height, width, 4), float32
+        Linear RGBA, row 0 at the bottom.
+    """
+    height, width = pixels.shape[:2]
+    image = image_of(width, height)
+    image.pixels.foreach_set(np.ascontiguousarray(pixels, np.float32).ravel())
+    image.update()
+    for space in _editors(image):
+        space.tag_redraw()
+    return image
+
+
+def show(image):
+    """Show the image in an Image Editor, if one is open."""
+    for window in bpy.context.window_manager.windows:
+        for area in window.screen.areas:
+            space = area.spaces.active
+            if area.type == "IMAGE_EDITOR" and area.ui_type == "IMAGE_EDITOR" and not space.use_image_pin:
+                space.image = image
+                return
+
+
+def _editors(image):
+    for window in bpy.context.window_manager.windows:
+        for area in window.screen.areas:
+            if area.type == "IMAGE_EDITOR" and area.spaces.active.image == image:
+                yield area

@@ -1,0 +1,162 @@
+"""Draws cells in the 3D view, or into a picture, from one texture with instancing.
+
+A redraw binds the texture and makes one draw call. The texture is made anew only when the cells or what is shown of
+them change; gpu needs no more than the box's twelve edges besides.
+"""
+
+import bpy
+import gpu
+import numpy as np
+
+from . import overlay_data
+from .. import session
+
+VERTEX = """
+void main()
+{
+  int i = gl_InstanceID * 3;
+  vec4 lo = texelFetch(boxes, ivec2(i % row, i / row), 0);
+  vec4 hi = texelFetch(boxes, ivec2((i + 1) % row, (i + 1) / row), 0);
+  colour = texelFetch(boxes, ivec2((i + 2) % row, (i + 2) / row), 0);
+  gl_Position = projection * vec4(mix(lo.xyz, hi.xyz, pos), 1.0);
+}
+"""
+FRAGMENT = "void main() { result = colour; }"
+
+
+class Boxes:
+    """Cells on the graphics card.
+
+    Parameters
+    ----------
+    texels : ndarray, float32
+        From :func:`overlay_data.boxes`.
+    n : int
+        Cells in it.
+    """
+
+    def __init__(self, texels, n):
+        self.n = n
+        rows, self.row, _ = texels.shape
+        data = gpu.types.Buffer("FLOAT", texels.size, np.ascontiguousarray(texels, np.float32).ravel())
+        self.texture = gpu.types.GPUTexture((self.row, rows), format="RGBA32F", data=data)
+
+    def draw(self, projection, in_front):
+        """Draw with a 4 x 4 matrix from world to clip space; `in_front` ignores what hides the cells."""
+        if not self.n:
+            return
+        shader, edges = _shader_and_edges()
+        gpu.state.blend_set("ALPHA")
+        gpu.state.depth_mask_set(False)  # a translucent line hides nothing
+        gpu.state.depth_test_set("NONE" if in_front else "LESS_EQUAL")
+        shader.bind()
+        shader.uniform_float("projection", projection)
+        shader.uniform_int("row", self.row)
+        shader.uniform_sampler("boxes", self.texture)
+        edges.draw_instanced(shader, instance_start=0, instance_count=self.n)
+        gpu.state.depth_test_set("NONE")
+        gpu.state.depth_mask_set(True)
+        gpu.state.blend_set("NONE")
+
+
+_gpu = {}  # shader, edges, and the viewport's boxes with their signature
+
+
+def _shader_and_edges():
+    if "shader" not in _gpu:
+        info = gpu.types.GPUShaderCreateInfo()
+        info.push_constant("MAT4", "projection")
+        info.push_constant("INT", "row")
+        info.sampler(0, "FLOAT_2D", "boxes")
+        info.vertex_in(0, "VEC3", "pos")
+        between = gpu.types.GPUStageInterfaceInfo("rayscope_boxes")
+        between.flat("VEC4", "colour")
+        info.vertex_out(between)
+        info.fragment_out(0, "VEC4", "result")
+        info.vertex_source(VERTEX)
+        info.fragment_source(FRAGMENT)
+        _gpu["shader"] = gpu.shader.create_from_info(info)
+        corner = np.array([[i >> 2 & 1, i >> 1 & 1, i & 1] for i in range(8)], np.float32)
+        ends = [(a, b) for a in range(8) for b in range(a) if bin(a ^ b).count("1") == 1]
+        vertices = gpu.types.GPUVertFormat()
+        vertices.attr_add(id="pos", comp_type="F32", len=3, fetch_mode="FLOAT")
+        buffer = gpu.types.GPUVertBuf(len=24, format=vertices)
+        buffer.attr_fill("pos", corner[np.array(ends).ravel()])
+        _gpu["edges"] = gpu.types.GPUBatch(type="LINES", buf=buffer)
+    return _gpu["shader"], _gpu["edges"]
+
+
+def draw_in_view():
+    """The 3D view's draw handler."""
+    scene = bpy.context.scene
+    built = session.built_of(scene)
+    overlay = scene.rayscope.overlay
+    if built is None or not overlay.show:
+        _gpu.pop("boxes", None)
+        _gpu.pop("signature", None)
+        return
+    signature = (built.number, overlay.signature())
+    if _gpu.get("signature") != signature:
+        _gpu["boxes"] = Boxes(*overlay_data.boxes(built.cells, **overlay.selection()))
+        _gpu["signature"] = signature
+    _gpu["boxes"].draw(gpu.matrix.get_projection_matrix() @ gpu.matrix.get_model_view_matrix(), overlay.in_front)
+
+
+def picture(pixels, texels, n, projection):
+    """Draw cells over a picture.
+
+    Parameters
+    ----------
+    pixels : ndarray, shape (height, width, 4)
+        Linear RGBA, row 0 at the bottom.
+    texels, n
+        From :func:`overlay_data.boxes`.
+    projection : Matrix
+        World to clip space of the picture's camera.
+
+    Returns
+    -------
+    ndarray, shape (height, width, 4), float32
+        Needs a graphics context: a window, ``gpu.init()`` (bpy 5.2), or a render engine with ``bl_use_gpu_context``.
+    """
+    pixels = np.ascontiguousarray(pixels, np.float32)
+    height, width = pixels.shape[:2]
+    target = gpu.types.GPUTexture((width, height), format="RGBA32F", data=gpu.types.Buffer("FLOAT", pixels.size, pixels.ravel()))
+    frame = gpu.types.GPUFrameBuffer(color_slots=target)
+    with frame.bind():
+        frame.viewport_set(0, 0, width, height)
+        Boxes(texels, n).draw(projection, in_front=True)
+    drawn = target.read()
+    drawn.dimensions = pixels.size
+    return np.array(drawn, np.float32).reshape(height, width, 4)
+
+
+def redraw():
+    """Have all 3D views drawn again."""
+    for window in bpy.context.window_manager.windows:
+        for area in window.screen.areas:
+            if area.type == "VIEW_3D":
+                area.tag_redraw()
+
+
+def release():
+    """Forget all GPU objects."""
+    _gpu.clear()
+
+
+_handler = None
+
+
+def register():
+    global _handler
+    if not bpy.app.background:  # a module or `blender -b` has no view to draw in
+        _handler = bpy.types.SpaceView3D.draw_handler_add(draw_in_view, (), "WINDOW", "POST_VIEW")
+
+
+def unregister():
+    global _handler
+    if _handler is not None:
+        bpy.types.SpaceView3D.draw_handler_remove(_handler, "WINDOW")
+        _handler = None
+    release()
+    redraw()

@@ -1,0 +1,109 @@
+"""What an overlay draws, as arrays: which cells, in which colours. Neither bpy nor gpu."""
+
+import numpy as np
+
+#: Cells whose three texels fill one row of the texture.
+CELLS_PER_ROW = 1024
+
+#: Sixteen equidistant colours of viridis (van der Walt and Smith 2015, CC0), sRGB: equal steps look equally large.
+VIRIDIS = ("440154", "481a6c", "472f7d", "414487", "39568c", "31688e", "2a788e", "23888e",
+           "1f988b", "22a884", "35b779", "54c568", "7ad151", "a5db36", "d2e21b", "fde725")
+
+COLOUR_BY = ("LEVEL", "COUNT", "COST")
+
+
+def linear(srgb):
+    """sRGB values 0..1 as linear ones."""
+    srgb = np.asarray(srgb, float)
+    return np.where(srgb <= 0.04045, srgb / 12.92, ((srgb + 0.055) / 1.055) ** 2.4)
+
+
+def colour_map(size=256):
+    """Viridis as linear RGB, shape (size, 3), float32."""
+    anchors = np.array([[int(c[i:i + 2], 16) / 255.0 for i in (0, 2, 4)] for c in VIRIDIS])
+    at = np.linspace(0.0, len(anchors) - 1.0, size)
+    return linear(np.stack([np.interp(at, np.arange(len(anchors)), c) for c in anchors.T], axis=-1)).astype(np.float32)
+
+
+def select(cells, levels=None, leaves_only=False, empty=True):
+    """Numbers of the cells to draw.
+
+    Parameters
+    ----------
+    cells : Cells
+    levels : (int, int), optional
+        First and last level, both included; all if absent.
+    leaves_only : bool
+        Only elementary cells.
+    empty : bool
+        Also cells without primitives.
+    """
+    keep = np.ones(len(cells), bool)
+    if levels is not None:
+        keep &= (cells.level >= levels[0]) & (cells.level <= levels[1])
+    if leaves_only:
+        keep &= cells.leaf
+    if not empty:
+        keep &= cells.count > 0
+    return np.flatnonzero(keep)
+
+
+def values(cells, by):
+    """The number that colours each cell, shape (c,): its level, its primitives, or its share of the SAH cost."""
+    return {"LEVEL": cells.level, "COUNT": cells.count, "COST": cells.cost}[by]
+
+
+def scale(cells, by):
+    """The values that the two ends of the colour map stand for: (lowest, highest).
+
+    Both are of the whole structure, not of the cells selected, so that a colour keeps its meaning while levels are
+    filtered. Counts and costs fall off by orders of magnitude below the root, so theirs is logarithmic.
+    """
+    value = values(cells, by)
+    if by != "LEVEL":
+        value = value[value > 0]
+    return (float(value.min()), float(value.max())) if len(value) else (0.0, 0.0)
+
+
+def place(cells, index, by):
+    """Where in the colour map, 0..1, the cells chosen lie, shape (n,); cells without primitives or cost lie at 0."""
+    low, high = scale(cells, by)
+    value = values(cells, by)[index].astype(np.float32)
+    if not high > low:
+        return np.zeros(len(index), np.float32)
+    if by == "LEVEL":
+        return (value - low) / (high - low)
+    return np.log(np.maximum(value, np.float32(low)) / np.float32(low)) / np.float32(np.log(high / low))
+
+
+def boxes(cells, levels=None, leaves_only=False, empty=True, by="LEVEL", opacity=1.0):
+    """The texture an instanced draw reads.
+
+    Parameters
+    ----------
+    cells : Cells
+    levels, leaves_only, empty
+        See :func:`select`.
+    by : {"LEVEL", "COUNT", "COST"}
+        What the colour shows.
+    opacity : float
+
+    Returns
+    -------
+    texels : ndarray, shape (rows, 3 * CELLS_PER_ROW, 4), float32
+        Three RGBA texels a cell: lower corner, upper corner, linear colour with opacity. Cells follow each other
+        along a row, so that cell i starts at texel 3 i.
+    n : int
+        Cells in it.
+    """
+    index = select(cells, levels, leaves_only, empty)
+    n = len(index)
+    texels = np.empty((max(1, -(-n // CELLS_PER_ROW)) * CELLS_PER_ROW, 3, 4), np.float32)
+    texels[n:] = 0.0
+    every = n == len(cells)
+    texels[:n, 0, :3] = cells.lo if every else cells.lo[index]
+    texels[:n, 1, :3] = cells.hi if every else cells.hi[index]
+    texels[:n, :2, 3] = 1.0
+    table = np.concatenate([colour_map(), np.full((256, 1), opacity, np.float32)], axis=1)
+    texels[:n, 2] = table[(place(cells, index, by) * 255.0 + 0.5).astype(np.uint8)]
+    return texels.reshape(-1, 3 * CELLS_PER_ROW, 4), n

@@ -1,0 +1,176 @@
+"""How long a run will take and how much memory it will need, before it starts.
+
+Rough on purpose: right to a factor of about three, which is what one needs to know before waiting. The constants were
+measured on the examples (`tools/measure_estimate.py`) on a machine whose :func:`machine_seconds` was `MACHINE`; other
+machines are scaled by theirs.
+"""
+
+import math
+import os
+import time
+from dataclasses import dataclass
+
+from ..catalogue import technique as row_of
+from ..errors import MemoryEstimateError
+
+#: Seconds of the reference loop on the machine where the constants were measured.
+MACHINE = 1.0e-3
+
+
+@dataclass(frozen=True)
+class Cost:
+    """What a technique costs in one core, in microseconds and bytes.
+
+    Parameters
+    ----------
+    build : float
+        Microseconds a primitive.
+    ray, growth : float
+        Microseconds a ray: ``ray + growth * g(N)``.
+    g : callable
+        How the cost of a ray grows with the number of primitives N.
+    memory : float
+        Bytes a primitive.
+    """
+
+    build: float
+    ray: float
+    growth: float
+    g: object
+    memory: float
+
+
+def _linear(n):
+    return n
+
+
+def _cube_root(n):
+    return n ** (1.0 / 3.0)
+
+
+def _log(n):
+    return math.log2(n + 1.0)
+
+
+COSTS = {
+    ("brute", "fast"): Cost(0.0, 3.0, 0.25, _linear, 300),
+    ("brute", "pure"): Cost(1.0, 20.0, 2.5, _linear, 600),
+    ("bvh", "fast"): Cost(2.0, 3.0, 1.0, _log, 600),
+    ("bvh", "pure"): Cost(120.0, 40.0, 40.0, _log, 1500),
+    ("grid", "fast"): Cost(10.0, 10.0, 0.5, _cube_root, 600),
+    ("grid", "pure"): Cost(60.0, 60.0, 6.0, _cube_root, 2000),
+    ("octree", "fast"): Cost(15.0, 10.0, 2.0, _log, 900),
+    ("octree", "pure"): Cost(120.0, 60.0, 60.0, _log, 3000),
+    ("embree", "fast"): Cost(1.5, 2.5, 0.1, _log, 500),
+    ("mathutils", "fast"): Cost(2.0, 6.0, 0.4, _log, 400),
+}
+#: For techniques not measured: a tree of its core.
+OTHERS = {"fast": COSTS["octree", "fast"], "pure": COSTS["octree", "pure"]}
+
+#: Bytes a pixel: the picture and the passes, with a batch of rays under way.
+PIXEL = 120
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """Seconds and bytes of a run, and what it consists of.
+
+    Attributes
+    ----------
+    seconds, bytes : float
+    primitives, rays : int
+    """
+
+    seconds: float
+    bytes: float
+    primitives: int
+    rays: int
+
+    def lines(self):
+        """The estimate in words."""
+        work = f"{self.primitives:,} primitives" + (f", {self.rays:,} rays" if self.rays else "")
+        return [f"This will take about {duration(self.seconds)} and {self.bytes / 1e6:,.0f} MB of memory ({work}).",
+                "Esc stops it and keeps what was done."]
+
+    def check_memory(self):
+        """Raise a MemoryEstimateError if there is less memory than it needs."""
+        free = free_memory()
+        if free is not None and self.bytes > free:
+            raise MemoryEstimateError(
+                f"About {self.bytes / 1e9:.1f} GB of memory would be needed for {self.primitives:,} primitives and {self.rays:,} rays, but "
+                f"{free / 1e9:.1f} GB are free: use fewer primitives, a coarser structure or a smaller picture.")
+        return self
+
+
+def estimate(scene, technique="bvh", core="fast", size=None, samples=1, depth=5):
+    """Estimate a build, and with a `size` the picture too.
+
+    Parameters
+    ----------
+    scene : Scene
+    technique : str
+    core : {"fast", "pure"}
+    size : tuple of int, optional
+        Width and height of the picture; only the build if absent.
+    samples, depth : int
+
+    Returns
+    -------
+    Estimate
+    """
+    from ..scene.layout import Layout
+    row = row_of(technique)
+    cost = COSTS.get((row.name, core), OTHERS[core])
+    layout = Layout.of(scene.objects)
+    # A mesh that instances share is stored once.
+    shared = {id(scene.objects[i].geometry): scene.objects[i].geometry for i in layout.instances}
+    stored = (sum(len(scene.objects[i].geometry) for i in layout.meshes) + len(layout.shapes) + len(layout.instances)
+              + sum(len(mesh) for mesh in shared.values()))
+    rays, pixels = 0, 0
+    if size is not None:
+        pixels = size[0] * size[1]
+        rays = int(pixels * samples * (1 + len(scene.lights)) * _generations(scene, depth))
+    seconds = 1e-6 * (stored * cost.build + rays * (cost.ray + cost.growth * cost.g(scene.n_primitives)))
+    return Estimate(seconds * machine_seconds() / MACHINE, stored * cost.memory + pixels * PIXEL, scene.n_primitives, rays)
+
+
+def _generations(scene, depth):
+    """How many times the primary rays' number is traced: mirrors and glass send rays on from where they are seen."""
+    materials = scene.used_materials()
+    if not any(m.mirror or m.mirror_base or m.transmission for m in materials):
+        return 1.0
+    return 1.0 + min(depth, 4) * 0.5
+
+
+def machine_seconds():
+    """Seconds of a fixed loop in Python: the best of three."""
+    best = math.inf
+    for _ in range(3):
+        start = time.perf_counter()
+        x = 0.0
+        for i in range(20_000):
+            x = x * 0.5 + i
+        best = min(best, time.perf_counter() - start)
+    return best
+
+
+def free_memory():
+    """Bytes that could be allocated now, or None where the system does not tell."""
+    try:
+        with open("/proc/meminfo") as file:
+            return next(int(line.split()[1]) * 1024 for line in file if line.startswith("MemAvailable:"))
+    except (OSError, StopIteration):
+        pass
+    try:
+        return os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
+    except (AttributeError, ValueError, OSError):
+        return None
+
+
+def duration(seconds):
+    """Seconds as a person says them."""
+    if seconds < 90:
+        return f"{seconds:.0f} s"
+    if seconds < 5400:
+        return f"{seconds / 60:.0f} min"
+    return f"{seconds / 3600:.1f} h"
