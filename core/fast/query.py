@@ -18,6 +18,11 @@ class Counts:
         """Count one intersection test for every entry of `ray`."""
         self.n_it += np.bincount(ray, minlength=len(self.n_it))
 
+    def add(self, ray, inner):
+        """Add the counts of rays that went into an instance; each belongs to one of our rays."""
+        for name in ("n_it", "n_ts", "n_ets", "n_eets"):
+            np.add.at(getattr(self, name), ray, getattr(inner, name))
+
     def steps(self, ray):
         """Count one traversal step for every entry of `ray`."""
         self.n_ts += np.bincount(ray, minlength=len(self.n_ts))
@@ -55,7 +60,7 @@ class Closest:
         """Test pairs of rays and primitives (numbers in the batch, numbers in the set); keep the nearest hits."""
         if self.counts:
             self.counts.tests(ray)
-        pair, t, u, v, detail = self.primitives.intersect(self.rays, ray, item, self.t)
+        pair, t, u, v, detail = self.primitives.intersect(self.rays, ray, item, self.t, self.counts)
         self.keep(ray[pair], item[pair], t, u, v, detail)
 
     def keep(self, ray, item, t, u, v, detail):
@@ -97,7 +102,7 @@ class Occluded:
         """Test pairs of rays and primitives."""
         if self.counts:
             self.counts.tests(ray)
-        pair = self.primitives.blocks(self.rays, ray, item, self.t)
+        pair = self.primitives.blocks(self.rays, ray, item, self.t, self.counts)
         self.keep(ray[pair])
 
     def keep(self, ray, *_):

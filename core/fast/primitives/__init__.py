@@ -17,6 +17,8 @@ A kind is one file with one class. Its objects hold n primitives of the kind as 
     Boxes (lo, hi) of the parts of primitives inside the boxes given; empty (lo > hi) where nothing is inside.
 ``support(item, axis)``
     Exact extent (d, D) of primitives along the directions given, shape (n, 3).
+
+and may offer ``blocks(rays, ray, item, t_far)``, the pairs that hit, where that is cheaper than ``intersect``.
 """
 
 import numpy as np
@@ -80,26 +82,26 @@ class Primitives:
             if len(at):
                 yield kind, at, item[at] - self.starts[k]
 
-    def intersect(self, rays, ray, item, t_far):
-        """Nearest hits of pairs; see the top of this file."""
+    def intersect(self, rays, ray, item, t_far, counts=None):
+        """Nearest hits of pairs; see the top of this file. `counts` also takes what instances count inside."""
         if len(self.kinds) == 1:
-            return self.kinds[0].intersect(rays, ray, item, t_far)
-        found = [[] for _ in range(5)]
+            return _counted(self.kinds[0].intersect, self.kinds[0], counts)(rays, ray, item, t_far)
+        found = [[np.zeros(0, np.int64)] for _ in range(5)]
         for kind, at, own in self._by_kind(item):
-            pair, *values = kind.intersect(rays, ray[at], own, t_far)
+            pair, *values = _counted(kind.intersect, kind, counts)(rays, ray[at], own, t_far)
             for column, value in zip(found, (at[pair], *values)):
                 column.append(value)
-        return [np.concatenate(c) if c else np.zeros(0, np.int64) for c in found]
+        return [np.concatenate(c) for c in found]
 
-    def blocks(self, rays, ray, item, t_far):
+    def blocks(self, rays, ray, item, t_far, counts=None):
         """The pairs that hit."""
-        if len(self.kinds) == 1 and not hasattr(self.kinds[0], "blocks"):
-            return self.kinds[0].intersect(rays, ray, item, t_far)[0]
         pairs = [np.zeros(0, np.int64)]
         for kind, at, own in self._by_kind(item):
-            own_ray = ray[at]
-            pair = (kind.blocks if hasattr(kind, "blocks") else lambda *a, k=kind: k.intersect(*a)[0])(rays, own_ray, own, t_far)
-            pairs.append(np.arange(len(item))[at][pair])
+            if hasattr(kind, "blocks"):
+                pair = _counted(kind.blocks, kind, counts)(rays, ray[at], own, t_far)
+            else:
+                pair = kind.intersect(rays, ray[at], own, t_far)[0]
+            pairs.append(pair if isinstance(at, slice) else at[pair])
         return np.concatenate(pairs)
 
     def surface(self, rays, item, t, u, v, detail):
@@ -131,3 +133,10 @@ class Primitives:
         for kind, at, own in self._by_kind(item):
             low[at], high[at] = kind.support(own, axis[at])
         return low, high
+
+
+def _counted(method, kind, counts):
+    """A kind's method; of a kind with structures inside, one that counts there too."""
+    if counts is None or not hasattr(kind, "structures"):
+        return method
+    return lambda *arguments: method(*arguments, counts=counts)

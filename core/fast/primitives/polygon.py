@@ -18,11 +18,8 @@ EDGES = 1 << 18
 def triangles(placed):
     """Polygons of three corners are triangles like those of a mesh."""
     corners = Corners.of(placed)
-    m = placed.matrix
-    minor = [m[1, (c + 1) % 3] * m[2, (c + 2) % 3] - m[1, (c + 2) % 3] * m[2, (c + 1) % 3] for c in range(3)]
-    flip = m[0, 0] * minor[0] + m[0, 1] * minor[1] + m[0, 2] * minor[2] < 0.0
     xyz = np.concatenate([corners.xyz[:, k::3] for k in range(3)])
-    return Triangles(xyz, placed.object_of, placed.primitive_of, flip)
+    return Triangles(xyz, placed.object_of, placed.primitive_of, placed.mirrors())
 
 
 class Polygons:

@@ -51,6 +51,13 @@ class Triangles:
             return cls(np.zeros((9, 0)), np.zeros(0, np.int32), np.zeros(0, np.int64), np.zeros(0, bool))
         return cls(np.concatenate(columns, axis=1), *(np.concatenate(c) for c in (object_of, primitive_of, flip)))
 
+    @classmethod
+    def of_mesh(cls, mesh):
+        """The usable triangles of a mesh in its own space, for instances of it."""
+        used = np.flatnonzero(mesh.usable)
+        corners = mesh.vertices[mesh.triangles[used]].reshape(-1, 9)
+        return cls(np.ascontiguousarray(corners.T), np.zeros(len(used), np.int32), used, np.zeros(len(used), bool))
+
     def bounds(self):
         """World boxes (lo, hi), each of shape (n, 3)."""
         a, b, c = self.xyz[0:3], self.xyz[3:6], self.xyz[6:9]
@@ -97,41 +104,19 @@ class Triangles:
 
     def surface(self, rays, item, t, u, v, detail):
         """Object, primitive, part, normal, point and error of hits."""
-        rows = self._rows(item)
-        point, error = np.empty((3, len(item))), np.zeros(len(item))
-        w = 1.0 - u - v
-        for axis in range(3):
-            a, b, c = w * rows[axis], u * rows[axis + 3], v * rows[axis + 6]
-            np.add(a + b, c, out=point[axis])
-            np.maximum(error, np.abs(a) + np.abs(b) + np.abs(c), out=error)
-        error *= GAMMA_7
+        rows = self.rows(item)
+        flip = self.flip[item] if self.flips else None
+        point, error = interpolated(rows, u, v)
         return (self.object_of.take(item), self.primitive_of.take(item), np.zeros(len(item), np.int32),
-                self._normals(rows, item).T, point.T, error)
+                normals(rows, flip).T, point.T, error)
 
-    def _rows(self, item):
+    def rows(self, item):
         """The columns of some triangles: nine arrays."""
         return [row.take(item) for row in self.xyz]
 
-    def _normals(self, rows, item):
-        """Unit normals, shape (3, m), outward by winding and object matrix; 0 for triangles without area."""
-        e, f = ([rows[axis + k] - rows[axis] for axis in range(3)] for k in (3, 6))
-        # Scaled by a power of two first, or the cross product of tiny edges underflows.
-        size = np.abs(e[0])
-        for edge in (*e[1:], *f):
-            np.maximum(size, np.abs(edge), out=size)
-        shift = -np.frexp(size)[1]
-        e, f = ([np.ldexp(edge, shift) for edge in some] for some in (e, f))
-        normal = np.stack([e[1] * f[2] - e[2] * f[1], e[2] * f[0] - e[0] * f[2], e[0] * f[1] - e[1] * f[0]])
-        length = np.sqrt(normal[0] * normal[0] + normal[1] * normal[1] + normal[2] * normal[2])
-        length[length == 0.0] = 1.0
-        if self.flips:
-            length[self.flip[item]] *= -1.0
-        normal /= length
-        return normal
-
     def overlaps(self, item, lo, hi):
         """Bool per pair: whether the triangle touches the box (Akenine-Moller 2001: 13 separating axes)."""
-        xyz = np.array(self._rows(item))
+        xyz = np.array(self.rows(item))
         lo, hi = lo.T, hi.T
         centre, half = 0.5 * (lo + hi), 0.5 * (hi - lo)
         v = [xyz[3 * k:3 * k + 3] - centre for k in range(3)]
@@ -185,6 +170,36 @@ class Triangles:
         a = axis.T
         p = [xyz[3 * k] * a[0] + xyz[3 * k + 1] * a[1] + xyz[3 * k + 2] * a[2] for k in range(3)]
         return np.minimum(np.minimum(p[0], p[1]), p[2]), np.maximum(np.maximum(p[0], p[1]), p[2])
+
+
+def interpolated(rows, u, v):
+    """Points of triangles (nine rows) with weights u, v of the second and third vertex: columns (3, m), and error bounds."""
+    point, error = np.empty((3, len(u))), np.zeros(len(u))
+    w = 1.0 - u - v
+    for axis in range(3):
+        a, b, c = w * rows[axis], u * rows[axis + 3], v * rows[axis + 6]
+        np.add(a + b, c, out=point[axis])
+        np.maximum(error, np.abs(a) + np.abs(b) + np.abs(c), out=error)
+    error *= GAMMA_7
+    return point, error
+
+
+def normals(rows, flip=None):
+    """Unit normals (3, m) of triangles (nine rows) by their winding, turned where `flip`; 0 for those without area."""
+    e, f = ([rows[axis + k] - rows[axis] for axis in range(3)] for k in (3, 6))
+    # Scaled by a power of two first, or the cross product of tiny edges underflows.
+    size = np.abs(e[0])
+    for edge in (*e[1:], *f):
+        np.maximum(size, np.abs(edge), out=size)
+    shift = -np.frexp(size)[1]
+    e, f = ([np.ldexp(edge, shift) for edge in some] for some in (e, f))
+    normal = np.stack([e[1] * f[2] - e[2] * f[1], e[2] * f[0] - e[0] * f[2], e[0] * f[1] - e[1] * f[0]])
+    length = np.sqrt(normal[0] * normal[0] + normal[1] * normal[1] + normal[2] * normal[2])
+    length[length == 0.0] = 1.0
+    if flip is not None:
+        length[flip] *= -1.0
+    normal /= length
+    return normal
 
 
 def _clip_plane(polygon, count, axis, sign, limit):
