@@ -193,6 +193,10 @@ class Placed:
         """One of the solids' values, as a column."""
         return np.array([s.values.get(name, default) for s in self.solids])
 
+    def mirrors(self):
+        """Bool per solid: whether its matrix turns left into right."""
+        return _determinant(self.matrix) < 0.0
+
 
 def place(objects, shapes):
     """Put solids into world space; those that cannot be used are left out (see :func:`faults`).
@@ -319,7 +323,7 @@ class Corners:
         length = np.sqrt((normal * normal).sum(axis=0))
         # A long thin polygon's area is small, but nothing like the rounding of its products.
         flat = ~(length > 64 * 2.0**-53 * count)
-        mirror = np.where(_determinant(m) < 0.0, -1.0, 1.0)
+        mirror = np.where(placed.mirrors(), -1.0, 1.0)
         return cls(start, xyz, following, np.where(flat, 0.0, normal / np.where(flat, 1.0, length) * mirror), anchor)
 
     def off_plane(self):

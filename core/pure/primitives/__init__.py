@@ -67,8 +67,8 @@ def primitives_of(scene, build):
     layout = Layout.of(scene.objects)
     primitives = triangles_of(scene.objects, layout.meshes)
     if layout.shapes:
-        from .sphere import spheres_of
-        primitives += spheres_of(scene.objects, layout.shapes)
+        from .solids import solids_of
+        primitives += solids_of(scene.objects, layout.shapes)
     if layout.instances:
         from .instance import instances_of
         primitives += instances_of(scene.objects, layout.instances, build)

@@ -1,5 +1,8 @@
 """Affine maps as four rows of plain numbers, applied in one fixed order of operations (as `layout.to_world` does)."""
 
+import math
+
+
 
 def rows(matrix):
     """The three rows that matter of a 4 x 4 array, as tuples."""
@@ -30,5 +33,5 @@ def unit(p):
     # Scaled first, or squares of tiny components underflow.
     scale = max(abs(x), abs(y), abs(z)) or 1.0
     x, y, z = x / scale, y / scale, z / scale
-    length = (x * x + y * y + z * z) ** 0.5 or 1.0
+    length = math.sqrt(x * x + y * y + z * z) or 1.0
     return x / length, y / length, z / length

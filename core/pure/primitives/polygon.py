@@ -1,0 +1,161 @@
+"""Planar polygons, convex or not, with holes by bridges.
+
+Inside is decided by the crossing rule, in the sheared space of the watertight triangle test: there the ray runs along
+an axis, and neighbours see the same corners, so that a ray can neither slip between two polygons nor meet both where
+one ends. What lies exactly on an edge is hit.
+"""
+
+import math
+
+from ...scene.solids import Corners
+from . import Primitive
+from .solids import EPSILON, divide, dot
+from .triangle import Triangle
+
+
+class ThreeCorners:
+    """Polygons of three corners are triangles like those of a mesh."""
+
+    @staticmethod
+    def all_of(placed):
+        """The list of placed triangles."""
+        points = Corners.of(placed)
+        xyz = [tuple(p) for p in points.xyz.T.tolist()]
+        return [Triangle(*xyz[3 * k:3 * k + 3], obj, primitive, flip) for k, (obj, primitive, flip)
+                in enumerate(zip(placed.object_of.tolist(), placed.primitive_of.tolist(), placed.mirrors().tolist()))]
+
+
+class Polygon(Primitive):
+    """A polygon in world space.
+
+    Parameters
+    ----------
+    corners : list of triples
+    normal : triple
+        Unit normal of its plane.
+    anchor : triple
+        A point of its plane.
+    obj, primitive : int
+        Object in the scene, and solid in its list.
+    """
+
+    KIND = "polygon"
+    __slots__ = ("corners", "normal", "anchor", "axes", "object", "primitive")
+
+    def __init__(self, corners, normal, anchor, obj=0, primitive=0):
+        self.corners, self.normal, self.anchor = corners, normal, anchor
+        self.object, self.primitive = obj, primitive
+        self.lo, self.hi = tuple(map(min, *corners)), tuple(map(max, *corners))
+        # The axis nearest to the normal is the third one; the others are those for u and v.
+        across = max(range(3), key=lambda axis: abs(normal[axis]))
+        self.axes = (across + 1) % 3, (across + 2) % 3, across
+
+    @classmethod
+    def all_of(cls, placed):
+        """The list of placed polygons."""
+        corners = Corners.of(placed)
+        xyz, start = corners.xyz.T.tolist(), corners.start.tolist()
+        return [cls(xyz[start[k]:start[k + 1]], normal, anchor, obj, primitive) for k, (normal, anchor, obj, primitive)
+                in enumerate(zip(corners.normal.T.tolist(), corners.anchor.T.tolist(), placed.object_of.tolist(), placed.primitive_of.tolist()))]
+
+    def intersect(self, ray, t_far, watch=None):
+        away = dot(self.normal, [a - o for a, o in zip(self.anchor, ray.o)])
+        t = divide(away, dot(self.normal, ray.d))
+        if not (ray.t_min <= t <= t_far and math.isfinite(t)):
+            return None
+        if not self.inside(ray.axes, [ray.o[axis] for axis in ray.axes], ray.shear[0], ray.shear[1]):
+            return None
+        p = [o + t * d for o, d in zip(ray.o, ray.d)]
+        u, v = ((p[axis] - self.lo[axis]) / (self.hi[axis] - self.lo[axis] or 1.0) for axis in self.axes[:2])
+        return t, u, v, 0
+
+    def inside(self, axes, origin, sx, sy):
+        """Whether a line passes through the polygon, or through its edge.
+
+        The line goes through `origin` (its coordinates in the order of `axes`) along the direction (sx, sy, 1).
+        """
+        kx, ky, kz = axes
+        sheared = []
+        for p in self.corners:
+            z = p[kz] - origin[2]
+            sheared.append(((p[kx] - origin[0]) - sx * z, (p[ky] - origin[1]) - sy * z))
+        odd = False
+        x, y = sheared[-1]
+        for x1, y1 in sheared:
+            side = x * y1 - x1 * y
+            if side == 0.0:
+                if min(x, x1) <= 0.0 <= max(x, x1) and min(y, y1) <= 0.0 <= max(y, y1):
+                    return True
+            # An edge that crosses the positive x axis; each corner belongs to one of its two edges.
+            elif (y > 0.0) != (y1 > 0.0) and (side > 0.0) == (y1 > 0.0):
+                odd = not odd
+            x, y = x1, y1
+        return odd
+
+    def surface(self, ray, t, u, v, detail):
+        p = [o + t * d for o, d in zip(ray.o, ray.d)]
+        off = dot(self.normal, [x - a for x, a in zip(p, self.anchor)])
+        p = [x - n * off for x, n in zip(p, self.normal)]
+        # Not beyond the polygon's box, where the ray met it edge-on.
+        point = tuple(min(max(x, l), h) for x, l, h in zip(p, self.lo, self.hi))
+        error = 16 * EPSILON * max(abs(x) + abs(a) for x, a in zip(p, self.anchor))
+        return self.object, self.primitive, 0, tuple(self.normal), point, error
+
+    def support(self, axis):
+        along = [dot(p, axis) for p in self.corners]
+        return min(along), max(along)
+
+    def overlaps(self, lo, hi):
+        """Whether the polygon touches the box."""
+        own_lo, own_hi = self.clip(lo, hi)
+        return all(l <= h for l, h in zip(own_lo, own_hi))
+
+    def clip(self, lo, hi):
+        """The box of the part inside a box.
+
+        Such a part's corners are the ends of the polygon's edges cut by the box, and the points of the polygon where
+        the box's edges meet its plane.
+        """
+        empty = (math.inf,) * 3, (-math.inf,) * 3
+        if not all(l <= oh and h >= ol for l, h, ol, oh in zip(lo, hi, self.lo, self.hi)):
+            return empty
+        slack = 64 * EPSILON * max(map(abs, (*lo, *hi, *self.lo, *self.hi)))
+        wide_lo, wide_hi = [x - slack for x in lo], [x + slack for x in hi]
+        points = [*self._cut_edges(wide_lo, wide_hi), *self._box_edges(wide_lo, wide_hi)]
+        if not points:
+            return empty
+        return (tuple(max(min(x) - slack, l) for x, l in zip(zip(*points), lo)),
+                tuple(min(max(x) + slack, h) for x, h in zip(zip(*points), hi)))
+
+    def _cut_edges(self, lo, hi):
+        """Ends of what a box leaves of the edges."""
+        for p, q in zip(self.corners, self.corners[1:] + self.corners[:1]):
+            t_in, t_out = 0.0, 1.0
+            e = [b - a for a, b in zip(p, q)]
+            for a, step, low, high in zip(p, e, lo, hi):
+                low, high = low - a, high - a
+                if step == 0.0:
+                    if not (low <= 0.0 <= high):
+                        t_in = math.inf
+                    continue
+                one, other = low / step, high / step
+                t_in, t_out = max(t_in, min(one, other)), min(t_out, max(one, other))
+            if t_in <= t_out:
+                yield [a + t_in * step for a, step in zip(p, e)]
+                yield [a + t_out * step for a, step in zip(p, e)]
+
+    def _box_edges(self, lo, hi):
+        """Points of the polygon on edges of a box."""
+        n, anchor = self.normal, self.anchor
+        for axis in range(3):
+            if n[axis] == 0.0:
+                continue
+            b, c = (axis + 1) % 3, (axis + 2) % 3
+            for at_b in (lo[b], hi[b]):
+                for at_c in (lo[c], hi[c]):
+                    point = [0.0] * 3
+                    point[b], point[c] = at_b, at_c
+                    point[axis] = anchor[axis] - (n[b] * (at_b - anchor[b]) + n[c] * (at_c - anchor[c])) / n[axis]
+                    # Looked at along the axis nearest to the normal.
+                    if lo[axis] <= point[axis] <= hi[axis] and self.inside(self.axes, [point[k] for k in self.axes], 0.0, 0.0):
+                        yield point
