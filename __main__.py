@@ -1,0 +1,26 @@
+"""``python -m rayscope VERB FILE ...``"""
+
+import sys
+
+from .core.command import main as command
+from .core.errors import MissingPackageError
+
+
+def open_in_blender(path, size):
+    """Read a file through the bpy module."""
+    try:
+        import bpy  # noqa: F401
+    except ImportError:
+        raise MissingPackageError(f"{path}: {path.suffix} files are read by Blender's module bpy, which is missing. Get it with: "
+                                  "pip install bpy (Python 3.13 for bpy 5.2), or run: blender -b FILE --command rayscope VERB.") from None
+    from .addon.open_file import open_file
+    return open_file(path, size)
+
+
+def main():
+    """The command; its exit code."""
+    return command(sys.argv[1:], open_in_blender=open_in_blender)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

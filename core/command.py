@@ -1,0 +1,419 @@
+"""The command: ``python -m rayscope VERB FILE ...`` and ``blender -b FILE --command rayscope VERB ...``.
+
+Results go to stdout, progress and log lines to stderr. Exit codes: 0 done, 1 the work failed (a difference was found,
+a package is missing, it was stopped), 2 the call was wrong. An error is one line, never a traceback.
+
+A verb is one row of ``VERBS``: a function that takes the parsed call and returns an :class:`Outcome`. Modules that only
+one verb needs are imported by it.
+"""
+
+import argparse
+import contextlib
+import os
+import re
+import signal
+import sys
+import time
+import traceback
+from dataclasses import dataclass
+from pathlib import Path
+
+from .catalogue import CORES, technique, techniques
+from .errors import Cancelled, MemoryEstimateError, MissingPackageError, ParameterError, RayscopeError
+from .figures import FIGURES
+from .lab import report
+from .parameters import resolve
+from .scene.camera import check_size
+from .scene.files import ENDINGS, read_file
+
+DONE, FAILED, WRONG_CALL = 0, 1, 2
+
+#: Longer side of a picture whose size was not given.
+DEFAULT_SIDE = 640
+
+#: Seconds between two lines of progress.
+INTERVAL = 2.0
+
+#: Runs estimated to take longer than this say so before they start.
+LONG_SECONDS = 10.0
+
+
+@dataclass
+class Outcome:
+    """What a verb returns.
+
+    Parameters
+    ----------
+    text : str
+        For people.
+    json : dict
+        The same for programs, see :func:`rayscope.core.lab.report.record`.
+    code : int
+        Exit code.
+    """
+
+    text: str
+    json: dict
+    code: int = DONE
+
+
+def main(argv=None, read_scene=None, open_in_blender=None):
+    """Run the command.
+
+    Parameters
+    ----------
+    argv : list of str, optional
+        The verb and what follows it; the process's own arguments if absent.
+    read_scene : callable, optional
+        Inside Blender: ``read_scene(size)`` reads the scene that is open, for a picture of that (width, height) or of
+        the scene's own proportions (None). The verbs then take no FILE.
+    open_in_blender : callable, optional
+        ``open_in_blender(path, size)`` reads a file that only Blender can read.
+
+    Returns
+    -------
+    int
+        The exit code.
+    """
+    try:
+        call = parser(with_file=read_scene is None).parse_args(sys.argv[1:] if argv is None else list(argv))
+    except SystemExit as stop:                                            # --help has printed
+        return stop.code or DONE
+    except ParameterError as error:
+        return _fail(f"rayscope: {error}", WRONG_CALL)
+    call.scene = lambda size=None: _scene(call, read_scene, open_in_blender, size)
+    try:
+        outcome = VERBS[call.verb].run(call)
+        print(report.to_json(outcome.json) if call.json else outcome.text, flush=True)
+        return outcome.code
+    except BrokenPipeError:                                               # the reader (head, less) has left
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return FAILED
+    except (MissingPackageError, MemoryEstimateError, Cancelled) as error:
+        return _fail(f"rayscope {call.verb}: {error}", FAILED)
+    except RayscopeError as error:
+        return _fail(f"rayscope {call.verb}: {error}", WRONG_CALL)
+    except OSError as error:
+        return _fail(f"rayscope {call.verb}: {error.filename or 'output'}: {error.strerror or error}.", WRONG_CALL)
+    except MemoryError:
+        return _fail(f"rayscope {call.verb}: there was not enough memory. Use fewer primitives, a coarser structure or a smaller picture.", FAILED)
+    except KeyboardInterrupt:
+        return _fail(f"rayscope {call.verb}: stopped.", FAILED)
+    except Exception as error:                                            # a mistake of ours
+        where = traceback.extract_tb(error.__traceback__)[-1]
+        return _fail(f"rayscope {call.verb}: internal error, please report it: {type(error).__name__}: {error} "
+                     f"({Path(where.filename).name}, line {where.lineno}).", FAILED)
+
+
+def say(line):
+    """Print a log line."""
+    print(line, file=sys.stderr, flush=True)
+
+
+def _fail(message, code):
+    say(" ".join(message.split()))
+    return code
+
+
+class Parser(argparse.ArgumentParser):
+    """A parser that raises where argparse would print several lines and exit."""
+
+    def error(self, message):
+        raise ParameterError(f"{message}. See: {self.prog} --help")
+
+
+def parser(with_file):
+    """The command's parser; `with_file`: verbs that need a scene take a FILE."""
+    top = Parser(prog="rayscope", allow_abbrev=False, description="Build, trace and compare ray tracing acceleration structures.")
+    top.add_argument("--version", action="version", version=f"Rayscope {report.version()}")
+    verbs = top.add_subparsers(dest="verb", metavar="VERB", required=True)
+    for name, verb in VERBS.items():
+        sub = verbs.add_parser(name, help=verb.help, description=verb.help, allow_abbrev=False)
+        if verb.scene and with_file:
+            sub.add_argument("file", metavar="FILE", help="scene: " + ", ".join(ENDINGS))
+        verb.options(sub)
+        sub.add_argument("--json", action="store_true", help="print the result as JSON")
+    return top
+
+
+def _scene(call, read_scene, open_in_blender, size):
+    """The scene of a call; what was left out of it is said on stderr."""
+    scene = read_scene(size) if read_scene else read_file(call.file, open_in_blender, size)
+    for notice in scene.notices:
+        say(f"{notice}")
+    return scene
+
+
+# --- what options mean ------------------------------------------------------------------------------------------------
+
+def whole(low, high):
+    """A type of option: a whole number from low to high."""
+    def parse(text):
+        try:
+            value = int(text)
+        except ValueError:
+            raise argparse.ArgumentTypeError(f"a whole number is needed, not {text!r}") from None
+        if not low <= value <= high:
+            raise argparse.ArgumentTypeError(f"{value} does not lie between {low} and {high}")
+        return value
+    return parse
+
+
+def picture_size(text):
+    """A type of option: WxH in pixels."""
+    match = re.fullmatch(r"(-?\d+)[xX](-?\d+)", text)
+    if not match:
+        raise argparse.ArgumentTypeError(f"width and height are written like 640x480, not {text!r}")
+    try:
+        return check_size(match.groups())
+    except RayscopeError as error:
+        raise argparse.ArgumentTypeError(str(error).rstrip(".")) from None
+
+
+def assignment(text):
+    """A type of option: NAME=VALUE."""
+    name, equals, value = text.partition("=")
+    if not (name and equals):
+        raise argparse.ArgumentTypeError(f"a parameter is written NAME=VALUE, not {text!r}")
+    return name, value
+
+
+def specification(text):
+    """A type of option: a technique with parameters, ``grid:walk=add:density=2``; (name, parameters)."""
+    name, *parameters = text.split(":")
+    return name, dict(assignment(p) for p in parameters)
+
+
+def checked(choice, core):
+    """A technique's name and its parameters' values in their own types.
+
+    Raises
+    ------
+    ParameterError
+    """
+    name, given = choice
+    row = technique(name)
+    if core not in row.cores:
+        raise ParameterError(f"{name} has no core {core!r}. It has: {', '.join(row.cores)}.")
+    values = resolve(name, row.parameters, given, core)
+    return name, {key: values[key] for key in given}
+
+
+def check_output(option, path):
+    """Fail before the work rather than after it when a file cannot be written."""
+    if path is None:
+        return
+    parent = Path(path).absolute().parent
+    if Path(path).is_dir():
+        raise ParameterError(f"{option} {path}: this is a folder; name a file.")
+    if not parent.is_dir():
+        raise ParameterError(f"{option} {path}: there is no folder {parent}; make it, or choose another.")
+    if not os.access(path if Path(path).exists() else parent, os.W_OK):
+        raise ParameterError(f"{option} {path}: it may not be written there; choose another place.")
+
+
+@contextlib.contextmanager
+def stoppable():
+    """A progress callback that prints lines now and then; Ctrl+C makes it raise Cancelled, so that what is done can be kept."""
+    stopped, told = [], [time.monotonic()]
+
+    def progress(fraction):
+        if stopped:
+            raise Cancelled("stopped.")
+        if time.monotonic() - told[0] > INTERVAL:
+            told[0] = time.monotonic()
+            say(f"{100 * fraction:.0f} %")
+
+    before = signal.signal(signal.SIGINT, lambda *_: stopped.append(True))
+    try:
+        yield progress
+    finally:
+        signal.signal(signal.SIGINT, before)
+
+
+# --- list -------------------------------------------------------------------------------------------------------------
+
+def list_verb(call):
+    """All techniques with their parameters."""
+    rows = [{"name": t.name, "label": t.label, "family": t.family, "cores": list(t.cores), "rays": list(t.rays), "primitives": t.primitives,
+             "source": t.source, "help": t.help,
+             "parameters": [{"name": p.name, "type": p.type.__name__, "default": {core: p.default_in(core) for core in t.cores},
+                             "choices": {core: list(p.choices_in(core)) for core in t.cores} if p.choices else None,
+                             "low": p.low, "high": p.high, "unit": p.unit, "help": p.help} for p in t.parameters]}
+            for t in techniques()]
+    text = []
+    for t in techniques():
+        only = "" if t.cores == CORES else f" (core {', '.join(t.cores)} only)"
+        text += [f"{t.name}: {t.help}{only}", f"    {t.source}. Rays: {', '.join(t.rays)}; primitives: {t.primitives}."]
+        for p in t.parameters:
+            span = " | ".join(p.choices) if p.choices else f"{p.low:g} to {p.high:g}" if None not in (p.low, p.high) else p.type.__name__
+            default = p.default_in(t.cores[-1]) if not isinstance(p.default, dict) else ", ".join(f"{v} ({core})" for core, v in p.default.items())
+            text.append(f"    {p.name} = {span}: {p.help}; {default}")
+        text.append("")
+    return Outcome("\n".join(text).rstrip(), report.record("list", techniques=rows))
+
+
+def no_options(sub):
+    """For verbs without."""
+
+
+# --- trace ------------------------------------------------------------------------------------------------------------
+
+def trace_options(sub):
+    sub.add_argument("--technique", metavar="NAME", type=specification, default=("bvh", {}),
+                     help="for all rays; with parameters: NAME:PARAMETER=VALUE:... (see the verb list)")
+    sub.add_argument("--set", metavar="PARAMETER=VALUE", type=assignment, action="append", default=[], help="a parameter of --technique")
+    for kind, rays in (("primary", "camera rays"), ("secondary", "reflected, refracted and transparent rays"), ("shadow", "shadow rays")):
+        sub.add_argument(f"--{kind}", metavar="NAME", type=specification, help=f"technique for {rays}")
+    sub.add_argument("--core", choices=CORES, default="fast")
+    sub.add_argument("--size", metavar="WxH", type=picture_size, help=f"pixels; without it {DEFAULT_SIDE} on the longer side")
+    sub.add_argument("--depth", type=int, default=5, help="reflections and refractions in a row, at most")
+    sub.add_argument("--samples", type=int, default=1, help="samples a pixel")
+    sub.add_argument("--seed", type=int, default=0)
+    sub.add_argument("--count", action="store_true", help="count tests and steps (slower)")
+    sub.add_argument("--image", metavar="OUT.png", help="write the picture")
+    sub.add_argument("--figures", metavar="OUT.json", help="write what it cost")
+
+
+def trace_verb(call):
+    """Trace a picture."""
+    from .image_file import save_png
+    from .lab.estimate import estimate
+    from .rendering import trace
+
+    name, parameters = checked((call.technique[0], {**call.technique[1], **dict(call.set)}), call.core)
+    others = {kind: checked(choice, call.core) for kind in ("primary", "secondary", "shadow") if (choice := getattr(call, kind))}
+    check_output("--image", call.image)
+    check_output("--figures", call.figures)
+    scene = call.scene(call.size)
+    size = call.size or proportional(scene.camera)
+    expected = estimate(scene, name, call.core, size, max(call.samples, 1), max(call.depth, 0)).check_memory()
+    if expected.seconds > LONG_SECONDS:
+        say(expected.lines()[0])
+    with stoppable() as progress:
+        result = trace(scene, name, call.core, size, call.depth, call.samples, call.seed, parameters=parameters, count=call.count,
+                       progress=progress, **others)
+    for notice in result.notices:
+        say(str(notice))
+    asked = {"technique": name, "parameters": parameters, **others, "core": call.core, "size": size, "depth": call.depth,
+             "samples": call.samples}
+    record = report.record("trace", scene, call.seed, asked, figures=result.figures, stopped=result.cancelled)
+    rows = [{"rays": kind, **{key: row.get(key) for key in ("technique", "hits", "N_IT", "N_TS", "N_ETS", "N_EETS", "r_ITM")}, "n": row["rays"]}
+            for kind, row in result.figures.items() if isinstance(row, dict) and row["rays"]]
+    columns = ["rays", "technique", "n", "hits", *(("N_IT", "N_TS", "N_ETS", "N_EETS", "r_ITM") if call.count else ())]
+    text = [report.table(rows, columns), "", f"T_B {result.figures['T_B']:.3g} s, T_R {result.figures['T_R']:.3g} s"]
+    if call.image:
+        save_png(call.image, result.image)
+        text.append(f"picture: {call.image}")
+    if call.figures:
+        Path(call.figures).write_text(report.to_json(record) + "\n", encoding="utf-8")
+        text.append(f"figures: {call.figures}")
+    if result.cancelled:
+        say("rayscope trace: stopped; what was done has been kept.")
+    return Outcome("\n".join(text), record, FAILED if result.cancelled else DONE)
+
+
+def proportional(camera):
+    """Picture size with a camera's own proportions, DEFAULT_SIDE on the longer side."""
+    if camera is None:
+        return DEFAULT_SIDE, DEFAULT_SIDE * 3 // 4
+    left, right, bottom, top = camera.window
+    width, height = abs(right - left), abs(top - bottom)
+    scale = DEFAULT_SIDE / max(width, height)
+    return max(1, round(width * scale)), max(1, round(height * scale))
+
+
+# --- compare ----------------------------------------------------------------------------------------------------------
+
+def compare_options(sub):
+    sub.add_argument("--techniques", metavar="A,B", help="only these; with parameters: grid:walk=add,bvh")
+    sub.add_argument("--core", choices=(*CORES, "both"), default="fast")
+    sub.add_argument("--rays", metavar="N", type=whole(1, 10_000_000), default=10_000, help="of each kind: primary, bounces, shadow")
+    sub.add_argument("--seed", type=whole(0, 2**31 - 1), default=0)
+    sub.add_argument("--out", metavar="DIR", help="write table, CSV, JSON and plots there")
+
+
+def compare_verb(call):
+    """All techniques on the same rays."""
+    from .lab.compare import COLUMNS, Contestant, compare, write
+
+    cores = CORES[::-1] if call.core == "both" else (call.core,)
+    contestants = None
+    if call.techniques is not None:
+        contestants = []
+        for spec in call.techniques.split(","):
+            choice = specification(spec)
+            within = [core for core in cores if core in technique(choice[0]).cores] or cores[:1]
+            contestants += [Contestant(choice[0], core, checked(choice, core)[1]) for core in within]
+    if call.out:
+        report.folder(call.out)
+    scene = call.scene()
+    result = compare(scene, contestants, cores, call.rays, call.seed, say=say)
+    record = report.record("compare", scene, call.seed, {"techniques": call.techniques, "core": call.core, "rays": call.rays}, **result)
+    kinds = ", ".join(f"{n} {kind}" for kind, n in result["rays"].items())
+    text = [f"{scene.name}: {scene.n_primitives} primitives; rays: {kinds}", "", report.table(result["rows"], COLUMNS), "",
+            *(f"{c}: {FIGURES[c]}" for c in COLUMNS if c in FIGURES),
+            "differ: rays whose hit is not brute force's, of those checked; differ_embree: whose hit is not Embree's (which computes in float32)"]
+    for line in result["left_out"]:
+        say(f"left out: {line}")
+    if call.out:
+        files, note = write(result, call.out, f"{scene.name}: {scene.n_primitives} primitives, {sum(result['rays'].values())} rays")
+        path = Path(call.out) / "compare.json"
+        path.write_text(report.to_json(record) + "\n", encoding="utf-8")
+        text += ["", *(f"written: {f}" for f in (*files, path))]
+        if note:
+            say(note)
+    if result["failed"]:
+        say("rayscope compare: a technique found other hits than brute force; see the column differ.")
+    return Outcome("\n".join(text), record, FAILED if result["failed"] else DONE)
+
+
+# --- bench ------------------------------------------------------------------------------------------------------------
+
+def bench_options(sub):
+    sub.add_argument("--subdivisions", type=whole(0, 6), default=4, help="of the monkey; 4 gives 272k triangles with the ground")
+    sub.add_argument("--size", metavar="WxH", type=picture_size, default=(512, 512), help="primary rays")
+    sub.add_argument("--repeats", type=whole(1, 100), default=3)
+    sub.add_argument("--seed", type=whole(0, 2**31 - 1), default=0)
+    sub.add_argument("--growth", action="store_true", help="also how times grow from 1k to 1M triangles")
+
+
+def bench_verb(call):
+    """Times against mathutils and Embree."""
+    from .lab import bench
+
+    result = bench.bench(call.subdivisions, call.size, call.repeats, call.seed, say=say)
+    if call.growth:
+        result["growth"] = bench.growth(call.seed, say=say)
+    record = report.record("bench", result.pop("scene"), call.seed,
+                           {"subdivisions": call.subdivisions, "size": call.size, "repeats": call.repeats, "growth": call.growth}, **result)
+    return Outcome(bench.text(record), record, FAILED if result["failed"] else DONE)
+
+
+@dataclass(frozen=True)
+class Verb:
+    """One verb.
+
+    Parameters
+    ----------
+    help : str
+    run : callable
+        ``run(call)`` returns an Outcome; ``call.scene(size)`` reads the scene.
+    options : callable
+        ``options(parser)`` adds the verb's own.
+    scene : bool
+        Whether it works on a scene.
+    """
+
+    help: str
+    run: object
+    options: object = no_options
+    scene: bool = True
+
+
+VERBS = {
+    "list": Verb("list all techniques with their parameters", list_verb, scene=False),
+    "trace": Verb("trace a picture", trace_verb, trace_options),
+    "compare": Verb("run techniques on the same rays; table, CSV, JSON, plots", compare_verb, compare_options),
+    "bench": Verb("measure against mathutils' BVHTree and Embree", bench_verb, bench_options, scene=False),
+}
