@@ -1,0 +1,32 @@
+"""Primary rays: where they pass through the picture, and where they start."""
+
+from .sampling import PIXEL, number
+from .vectors import add, times
+
+
+def primary(camera, size, x, y, key):
+    """The ray through a pixel.
+
+    Parameters
+    ----------
+    camera : Camera
+    size : (int, int)
+    x, y : int
+        The pixel, from the left and from the bottom.
+    key : int or None
+        Key of the ray, which then passes through a random point of the pixel; None: through its centre.
+
+    Returns
+    -------
+    origin, direction : tuple of 3 float
+        The direction has length 1 along the viewing axis.
+    """
+    left, right_, bottom, top = camera.window
+    position, right, up, forward = (tuple(v.tolist()) for v in camera.frame())
+    dx, dy = (0.5, 0.5) if key is None else (number(key, PIXEL), number(key, PIXEL + 1))
+    u = left + (x + dx) / size[0] * (right_ - left)
+    v = bottom + (y + dy) / size[1] * (top - bottom)
+    across = add(times(u, right), times(v, up))
+    if camera.kind == "perspective":
+        return position, add(across, forward)
+    return add(position, across), forward

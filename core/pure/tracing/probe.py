@@ -1,0 +1,29 @@
+"""Asking a structure, and counting what it cost."""
+
+from ..ray import Ray
+from ..watch import Counter
+
+COUNTED = ("n_it", "n_ts", "n_ets", "n_eets")
+
+
+class Probe:
+    """One structure, as the tracer asks it.
+
+    Parameters
+    ----------
+    structure : Structure
+    count : bool
+    """
+
+    def __init__(self, structure, count):
+        self.structure, self.count = structure, count
+
+    def closest(self, o, d, t_min, t_max):
+        """The hit, or None, and a Counter where counted, else None."""
+        counter = Counter() if self.count else None
+        return self.structure.closest_ray(Ray(o, d, t_min, t_max), counter), counter
+
+    def occluded(self, o, d, t_max):
+        """Whether anything is in the way, and a Counter or None."""
+        counter = Counter() if self.count else None
+        return self.structure.occluded_ray(Ray(o, d, 0.0, t_max), counter), counter

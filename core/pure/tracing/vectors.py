@@ -1,0 +1,65 @@
+"""Vectors as triples."""
+
+import math
+
+
+def dot(a, b):
+    """Dot product."""
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+def add(a, b):
+    """Sum."""
+    return a[0] + b[0], a[1] + b[1], a[2] + b[2]
+
+
+def minus(a, b):
+    """Difference."""
+    return a[0] - b[0], a[1] - b[1], a[2] - b[2]
+
+
+def times(s, a):
+    """A number times a vector."""
+    return s * a[0], s * a[1], s * a[2]
+
+
+def mul(a, b):
+    """Products of components: a colour seen through another."""
+    return a[0] * b[0], a[1] * b[1], a[2] * b[2]
+
+
+def cross(a, b):
+    """Cross product."""
+    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
+
+
+def unit(a):
+    """The vector scaled to length 1; zero stays zero."""
+    length = math.sqrt(dot(a, a))
+    return (a[0] / length, a[1] / length, a[2] / length) if length > 0.0 else a
+
+
+def frame(n):
+    """Two vectors that make a right-handed frame with the unit vector n (Duff et al., JCGT 6(1), 2017)."""
+    sign = math.copysign(1.0, n[2])
+    a = -1.0 / (sign + n[2])
+    b = n[0] * n[1] * a
+    return ((1.0 + sign * n[0] * n[0] * a, sign * b, -sign * n[0]),
+            (b, sign + n[1] * n[1] * a, -n[1]))
+
+
+def pushed(point, error, normal, direction):
+    """Origin for a ray that leaves a surface along `direction`.
+
+    The point is moved along the geometric normal, to the side the ray goes, until it is clear of the box of its
+    rounding error, and rounded away from the surface (Pharr et al., PBR 4th ed., 6.8.6). No constant is involved.
+    """
+    reach = error * (abs(normal[0]) + abs(normal[1]) + abs(normal[2]))
+    if dot(direction, normal) < 0.0:
+        reach = -reach
+    return tuple(_rounded_away(p, reach * n) for p, n in zip(point, normal))
+
+
+def _rounded_away(p, offset):
+    """p + offset, and on to the next number."""
+    return math.nextafter(p + offset, math.copysign(math.inf, offset)) if offset else p

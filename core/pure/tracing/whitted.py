@@ -1,0 +1,210 @@
+"""Whitted's ray tracer (1980), one ray at a time.
+
+What a ray sees is the surface's emission, ambient and local light, plus the weighted radiance of the reflected, the
+refracted and the transparent ray. Whitted wrote that as a recursion; here the rays still to be traced wait on a stack with
+the weight that they have in the pixel. The sum is the same, and two facing mirrors cannot exhaust Python's stack.
+
+Modules for lights, glass, mirrors and textures are imported only for a scene that has any.
+"""
+
+import math
+from dataclasses import dataclass
+
+from . import sampling
+from .camera import primary
+from .probe import COUNTED, Probe
+from .surface import Surfaces
+from .vectors import add, dot, minus, mul, pushed, times, unit
+
+#: Side of the tiles that the picture is made in.
+TILE = 16
+
+PRIMARY, REFLECTED, REFRACTED, TRANSPARENT, SHADOW = range(5)
+KINDS = ("primary", "reflected", "refracted", "transparent", "shadow")
+
+
+@dataclass(slots=True)
+class Path:
+    """A ray that waits to be traced.
+
+    Attributes
+    ----------
+    o, d : tuple of 3 float
+    t_min, t_max : float
+    weight : tuple of 3 float
+        Share of its radiance in the pixel.
+    depth : int
+        Reflections and refractions so far.
+    kind : int
+    key : int or None
+        Of its random numbers.
+    """
+
+    o: tuple
+    d: tuple
+    t_min: float
+    t_max: float
+    weight: tuple
+    depth: int
+    kind: int
+    key: int | None
+
+
+class Whitted:
+    """The tracer of one picture.
+
+    Parameters
+    ----------
+    scene : Scene
+    structures : dict
+        ``primary``, ``secondary``, ``shadow``: the structure that answers each kind of ray.
+    size : (int, int)
+    depth : int
+        Reflections and refractions in a row, at most (H).
+    samples : int
+        Samples a pixel that the picture will have.
+    seed : int
+    count : bool
+        Also count intersection tests and traversal steps.
+    check : callable
+        Called without arguments every few ten milliseconds; may raise Cancelled.
+
+    Attributes
+    ----------
+    tally : dict
+        Per kind of ray: rays, hits, n_it, n_ts, n_ets, n_eets.
+    """
+
+    tile_side = TILE
+
+    def __init__(self, scene, structures, size, depth, samples, seed, count, check):
+        self.scene, self.size, self.depth, self.samples, self.seed, self.count = scene, size, depth, samples, seed, count
+        self.check = check
+        self.probe = {kind: Probe(s, count) for kind, s in structures.items()}
+        self.surfaces = Surfaces(scene)
+        self.ambient = scene.world.ambient_light()
+        self.tally = {kind: dict.fromkeys(("rays", "hits", *COUNTED), 0) for kind in KINDS}
+        materials = scene.used_materials()
+        self.bounces = depth > 0 and any(m.reflects for m in materials)
+        self.transparent = any(m.transparent for m in materials)
+        self.coloured_shadows = self.transparent or any(m.refracts for m in materials)
+        self.lights = [light for light in scene.lights if any(light.colour)]
+        self.soft = samples > 1 and any(light.has_extent for light in self.lights)
+
+    def tile(self, x0, y0, x1, y1, sample):
+        """One sample of every pixel with x0 <= x < x1, y0 <= y < y1.
+
+        Returns
+        -------
+        dict
+            Lists with one entry a pixel, row by row from the bottom: ``combined``, ``rays_per_pixel``, ``n_it`` and ``n_ts``
+            where counted; for sample 0 also ``depth``, ``normal``, ``position``, ``object_index`` and ``primitive_index``.
+        """
+        out = {}
+        for y in range(y0, y1):
+            for x in range(x0, x1):
+                for name, value in self.pixel(x, y, sample).items():
+                    out.setdefault(name, []).append(value)
+        return out
+
+    def pixel(self, x, y, sample):
+        """One sample of a pixel; what it returns is named as in :meth:`tile`."""
+        key = sampling.first_key(y * self.size[0] + x, sample, self.seed) if self.samples > 1 else None
+        o, d = primary(self.scene.camera, self.size, x, y, key)
+        self.spent = dict.fromkeys(("rays_per_pixel", *(("n_it", "n_ts") if self.count else ())), 0)
+        camera = self.scene.camera
+        radiance, first = (0.0, 0.0, 0.0), None
+        stack = [Path(o, d, float(camera.near), float(camera.far), (1.0, 1.0, 1.0), 0, PRIMARY, key if self.soft else None)]
+        while stack:
+            path = stack.pop()
+            hit = self._closest(path.kind, path.o, path.d, path.t_min, path.t_max)
+            surface = None if hit is None else self.surfaces.at(hit, path.d)
+            first = first or (hit, surface)
+            if surface is None:
+                radiance = add(radiance, mul(path.weight, self._sky(path.d)))
+                continue
+            seen = self._seen(surface, path.d, path.key)
+            radiance = add(radiance, mul(path.weight, times(surface.alpha, seen)))
+            stack += self._onward(path, hit, surface)
+        return {"combined": radiance, **self.spent, **({} if sample else self._first(*first))}
+
+    def _closest(self, kind, o, d, t_min, t_max):
+        """The nearest hit, counted."""
+        probe = self.probe["primary" if kind == PRIMARY else "shadow" if kind == SHADOW else "secondary"]
+        hit, counter = probe.closest(o, d, t_min, t_max)
+        self._count(kind, hit is not None, counter)
+        return hit
+
+    def _count(self, kind, met, counter):
+        """Add a ray to the tally and to its pixel."""
+        tally = self.tally[KINDS[kind]]
+        tally["rays"] += 1
+        tally["hits"] += met
+        self.spent["rays_per_pixel"] += 1
+        if counter:
+            for name in COUNTED:
+                tally[name] += getattr(counter, name)
+            self.spent["n_it"] += counter.n_it
+            self.spent["n_ts"] += counter.n_ts
+        self.check()
+
+    @staticmethod
+    def _first(hit, surface):
+        """The passes that show what the primary ray met."""
+        if hit is None:
+            return {"depth": math.inf, "normal": (0.0, 0.0, 0.0), "position": (0.0, 0.0, 0.0),
+                    "object_index": -1, "primitive_index": -1}
+        return {"depth": hit.t, "normal": surface.shading, "position": hit.point,
+                "object_index": hit.object, "primitive_index": hit.primitive}
+
+    def _seen(self, surface, d, key):
+        """What a surface sends along the ray by itself: emission, ambient and local light."""
+        material = surface.material
+        seen = add(material.emission, mul(self.ambient, times(material.ambient, surface.base)))
+        if self.lights:
+            from .shading import lit
+            seen = add(seen, lit(surface, d, self.lights, self._transmitted, key))
+        return seen
+
+    def _sky(self, d):
+        """Radiance of the surroundings."""
+        world = self.scene.world
+        colour = tuple(map(float, world.colour))
+        if world.image is None:
+            return colour
+        from .texture import surroundings
+        d = unit(d)
+        if world.rotation is not None:
+            d = tuple(dot(tuple(map(float, row)), d) for row in world.rotation)
+        return mul(colour, surroundings(world.image, d))
+
+    def _transmitted(self, surface, to, reach):
+        """Share of light, a colour, that reaches a surface from where `to` points; the shadow ray."""
+        o = pushed(surface.point, surface.error, surface.normal, to)
+        # The ray starts beside the point, and must still end at the light.
+        d = add(to, minus(surface.point, o)) if math.isfinite(reach) else to
+        if not self.coloured_shadows:
+            blocked, counter = self.probe["shadow"].occluded(o, d, reach)
+            self._count(SHADOW, blocked, counter)
+            return (0.0, 0.0, 0.0) if blocked else (1.0, 1.0, 1.0)
+        from .shadows import filtered
+        return filtered(lambda o, d, t_max: self._closest(SHADOW, o, d, 0.0, t_max), self.surfaces, o, d, reach)
+
+    def _onward(self, path, hit, surface):
+        """Yield the rays that a surface sends on."""
+        if self.transparent:
+            # Going straight on is no bounce: a leaf's cut-out corner must not use up the depth.
+            yield from self._spawn(path, surface, TRANSPARENT, path.d, (1.0 - surface.alpha,) * 3, path.t_max - hit.t)
+        if self.bounces and surface.material.reflects and path.depth < self.depth:
+            from .secondary import mirrored_and_refracted
+            for kind, (direction, share) in zip((REFLECTED, REFRACTED), mirrored_and_refracted(surface, path.d)):
+                yield from self._spawn(path, surface, kind, direction, share, math.inf)
+
+    @staticmethod
+    def _spawn(path, surface, kind, direction, share, t_max):
+        """Yield a ray from a surface, unless it has no weight."""
+        weight = mul(path.weight, share)
+        if max(weight) > 0.0 and t_max >= 0.0:
+            yield Path(pushed(surface.point, surface.error, surface.normal, direction), direction, 0.0, t_max, weight,
+                       path.depth + (kind != TRANSPARENT), kind,
+                       None if path.key is None else sampling.branch(path.key, kind))
