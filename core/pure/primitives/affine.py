@@ -3,7 +3,6 @@
 import math
 
 
-
 def rows(matrix):
     """The three rows that matter of a 4 x 4 array, as tuples."""
     return tuple(tuple(row) for row in matrix.tolist()[:3])
