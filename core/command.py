@@ -373,7 +373,7 @@ def compare_verb(call):
 def bench_options(sub):
     sub.add_argument("--subdivisions", type=whole(0, 6), default=4, help="of the monkey; 4 gives 272k triangles with the ground")
     sub.add_argument("--size", metavar="WxH", type=picture_size, default=(512, 512), help="primary rays")
-    sub.add_argument("--repeats", type=whole(1, 100), default=3)
+    sub.add_argument("--repeats", type=whole(1, 100), default=5)
     sub.add_argument("--seed", type=whole(0, 2**31 - 1), default=0)
     sub.add_argument("--growth", action="store_true", help="also how times grow from 1k to 1M triangles")
 
