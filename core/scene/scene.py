@@ -78,10 +78,21 @@ class Shapes:
     ----------
     solids : list of Solid or Combination
     name : str
+
+    Attributes
+    ----------
+    corner_normals : ndarray, shape (n, 3, 3), or None
+        Shading normals of solids that are smooth triangles, 0 for the others; None where there are none.
     """
 
     solids: list
     name: str = "Shapes"
+
+    def __post_init__(self):
+        smooth = [k for k, s in enumerate(self.solids) if getattr(s, "kind", "") == "triangle" and "normals" in s.values]
+        self.corner_normals = np.zeros((len(self.solids), 3, 3), np.float32) if smooth else None
+        for k in smooth:
+            self.corner_normals[k] = self.solids[k].values["normals"]
 
     def __len__(self):
         return len(self.solids)
