@@ -110,7 +110,7 @@ def _closure(reader, socket, groups):
     read = SHADERS.get(node.type)
     if read is None:
         reader.lost(f"the shader {node.name} ({node.bl_label}) cannot be traced; a grey diffuse surface was used instead")
-        return Closure(Material(reader.name, base=(1.0, 1.0, 1.0)), Value.constant((0.8, 0.8, 0.8)))
+        return Closure(Material.principled(reader.name, (1.0, 1.0, 1.0), roughness=1.0, specular_level=0.0), Value.constant((0.8, 0.8, 0.8)))
     normal = node.inputs.get("Normal")
     if normal is not None and reader.source(normal, groups)[0] is not None:
         reader.lost("its bump or normal map is not traced; the smooth normals were used")
@@ -206,13 +206,14 @@ def _combined(reader, a, b, share_a, share_b):
     sums = {name: float(share @ [getattr(m, name) for m in materials]) for name in COEFFICIENTS}
     sums["emission"] = tuple((share @ np.array([m.emission for m in materials])).tolist())
 
-    def average(name, weight):
-        w = share * [weight(m) for m in materials]
-        values = [getattr(m, name) for m in materials]
+    def average(values, weights):
+        w = share * weights
         return float(w @ values / w.sum()) if w.sum() else values[int(share[1] > share[0])]
 
-    sums["shininess"] = average("shininess", lambda m: m.specular + m.specular_base)
-    sums["ior"] = average("ior", lambda m: m.mirror + m.transmission)
+    polished = [m.mirror + m.transmission for m in materials]
+    sums["shininess"] = average([m.shininess for m in materials], [m.specular + m.specular_base for m in materials])
+    sums["ior"] = average([m.ior for m in materials], polished)
+    sums["reflectance"] = average([m.reflectance_at_normal() for m in materials], polished)
     coloured = share * [m.diffuse + m.mirror_base + m.transmission for m in materials]
     return Closure(replace(a.material, **sums), _average(reader, a.base, b.base, coloured), Value.constant(alpha))
 
