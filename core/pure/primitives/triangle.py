@@ -7,6 +7,7 @@ ray cannot slip between them.
 
 import math
 
+from ...scene.exact import DOUBTFUL, watertight
 from ...scene.layout import mirrors, to_world
 from . import Primitive
 
@@ -83,8 +84,13 @@ class Triangle(Primitive):
         if not ((u >= 0.0 and v >= 0.0 and w >= 0.0) or (u <= 0.0 and v <= 0.0 and w <= 0.0)):
             return None
         det = u + v + w
-        if det == 0.0:      # seen edge-on
-            return None
+        if abs(det) <= DOUBTFUL * (abs(cx * by) + abs(cy * bx) + abs(ax * cy) + abs(ay * cx) + abs(bx * ay) + abs(by * ax)):
+            # Seen edge-on, or hardly a triangle: the edge functions are little but rounding errors.
+            exact = watertight((ax, ay), (bx, by), (cx, cy), self.a, self.b, self.c)
+            if exact is None:
+                return None
+            u, v, w = exact
+            det = u + v + w
         t = (u * (sz * az) + v * (sz * bz) + w * (sz * cz)) / det
         if not (ray.t_min <= t <= t_far and math.isfinite(t)):
             return None
