@@ -49,8 +49,7 @@ class Rays:
         t_min, t_max = (np.broadcast_to(np.asarray(t, float), (n,)) for t in (t_min, t_max))
         size = np.abs(directions)
         largest = np.maximum(np.maximum(size[0], size[1]), size[2])
-        # A NaN or infinite origin makes this NaN.
-        finite = (origins[0] + origins[1] + origins[2]) * 0.0 == 0.0
+        finite = np.isfinite(origins[0]) & np.isfinite(origins[1]) & np.isfinite(origins[2])
         usable = finite & (largest > 0.0) & (largest < np.inf) & (t_min <= t_max)
         index = np.flatnonzero(usable)
         if len(index) < n:

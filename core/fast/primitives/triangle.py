@@ -7,6 +7,7 @@ so a ray cannot slip between them.
 
 import numpy as np
 
+from ...scene.exact import DOUBTFUL, watertight
 from ...scene.layout import mirrors, to_world
 
 #: gamma(7): relative error of a point interpolated from three vertices (Pharr et al., PBR 4th ed., 6.8.5).
@@ -92,15 +93,23 @@ class Triangles:
         w = x[1] * y[0] - y[1] * x[0]
         # All of one sign, zeros allowed.
         pair = np.flatnonzero((np.minimum(np.minimum(u, v), w) >= 0.0) | (np.maximum(np.maximum(u, v), w) <= 0.0))
-        u, v, w, hit_ray = u[pair], v[pair], w[pair], ray[pair]
-        sz = s[2].take(hit_ray)
+        u, v, w, hit_ray = u.take(pair), v.take(pair), w.take(pair), ray.take(pair)
+        x, y, z = ([column.take(pair) for column in axis] for axis in (x, y, z))
         det = u + v + w
+        products = sum(np.abs(p * q) for p, q in ((x[2], y[1]), (y[2], x[1]), (x[0], y[2]), (y[0], x[2]), (x[1], y[0]), (y[1], x[0])))
+        # Seen edge-on, or hardly a triangle: the edge functions are little but rounding errors.
+        doubtful = np.flatnonzero(np.abs(det) <= DOUBTFUL * products)
+        for i in doubtful:
+            corners = self.xyz[:, item[pair[i]]].reshape(3, 3).tolist()
+            exact = watertight(*((float(x[k][i]), float(y[k][i])) for k in range(3)), *corners)
+            u[i], v[i], w[i] = exact or (0.0, 0.0, 0.0)
+            det[i] = u[i] + v[i] + w[i]
+        sz = s[2].take(hit_ray)
         with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-            t = (u * (sz * z[0][pair]) + v * (sz * z[1][pair]) + w * (sz * z[2][pair])) / det
-        # det = 0: seen edge-on (t is then NaN or infinite).
-        good = np.flatnonzero((det != 0.0) & (t >= rays.t_min.take(hit_ray)) & (t <= t_far.take(hit_ray)) & np.isfinite(t))
-        pair, det = pair[good], det[good]
-        return pair, t[good], v[good] / det, w[good] / det, np.zeros(len(pair), np.int64)
+            t = (u * (sz * z[0]) + v * (sz * z[1]) + w * (sz * z[2])) / det
+        good = np.flatnonzero((t >= rays.t_min.take(hit_ray)) & (t <= t_far.take(hit_ray)) & np.isfinite(t))
+        pair, det = pair.take(good), det.take(good)
+        return pair, t.take(good), v.take(good) / det, w.take(good) / det, np.zeros(len(pair), np.int64)
 
     def surface(self, rays, item, t, u, v, detail):
         """Object, primitive, part, normal, point and error of hits."""
