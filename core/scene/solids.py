@@ -35,6 +35,7 @@ class Kind:
     closed: object = lambda solid: True
 
 
+_IDENTITY = np.eye(4)
 _SQUARE = [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)]
 BOX_CORNERS = [(x, y, z) for z in (-1.0, 1.0) for x, y in _SQUARE]
 PYRAMID_CORNERS = [(x, y, 0.0) for x, y in _SQUARE] + [(0.0, 0.0, 1.0)]
@@ -142,29 +143,26 @@ def polygon(points, normals=None, **more):
     values = {"points": points}
     if normals is not None:
         values["normals"] = np.asarray(normals, float).reshape(points.shape)
-    return Solid("triangle" if len(points) == 3 else "polygon", np.eye(4), values=values, **more)
+    return Solid("triangle" if len(points) == 3 else "polygon", _IDENTITY.copy(), values=values, **more)
 
 
 def _columns(x, y, z, origin):
     """The affine matrix with these columns."""
-    matrix = np.eye(4)
-    matrix[:3, 0], matrix[:3, 1], matrix[:3, 2], matrix[:3, 3] = x, y, z, origin
-    return matrix
+    return np.array([*([float(v) for v in row] for row in zip(x, y, z, origin)), [0.0, 0.0, 0.0, 1.0]])
 
 
 def _about_axis(base, apex, radius):
     """Matrix that takes z from 0 to 1 onto an axis, and the unit circle onto one of a radius square to it."""
-    base, apex = np.asarray(base, float), np.asarray(apex, float)
-    axis = apex - base
+    axis = [float(b) - float(a) for a, b in zip(base, apex)]
     length = math.hypot(*axis)
-    z = axis / length if length > 0.0 else np.array([0.0, 0.0, 1.0])
+    x, y, z = (v / length for v in axis) if length > 0.0 else (0.0, 0.0, 1.0)
     # Duff et al. 2017: an orthonormal basis without a branch that could fail.
-    sign = math.copysign(1.0, z[2])
-    a = -1.0 / (sign + z[2])
-    b = z[0] * z[1] * a
-    x = np.array([1.0 + sign * z[0] * z[0] * a, sign * b, -sign * z[0]])
-    y = np.array([b, sign + z[1] * z[1] * a, -z[1]])
-    return _columns(radius * x, radius * y, axis, base)
+    sign = math.copysign(1.0, z)
+    a = -1.0 / (sign + z)
+    b = x * y * a
+    e = radius * (1.0 + sign * x * x * a), radius * (sign * b), radius * (-sign * x)
+    f = radius * b, radius * (sign + y * y * a), radius * -y
+    return _columns(e, f, axis, base)
 
 
 @dataclass
