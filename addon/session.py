@@ -16,17 +16,23 @@ class Built:
     index : core structure
     cells : Cells
         What an overlay draws.
+    n_objects : int
+        Objects in Blender's scene at the time.
     stale : bool
         Whether Blender's scene has changed since.
     number : int
         Different for every build.
+    ends : dict
+        Values that the ends of the colour map stand for, by what the colours show; filled when they are first drawn.
     """
 
     scene: object
     index: object
     cells: object
+    n_objects: int
     stale: bool = False
     number: int = field(default_factory=lambda: next(_numbers))
+    ends: dict = field(default_factory=dict)
 
 
 _built = {}  # Blender scene's session_uid -> Built
@@ -75,12 +81,3 @@ def forget(uid=None):
     else:
         for kept in (_built, _figures, _notices):
             kept.pop(uid, None)
-
-
-def mark_stale(uid):
-    """A Blender scene has changed; true if that is news."""
-    built = _built.get(uid)
-    if built is None or built.stale:
-        return False
-    built.stale = True
-    return True

@@ -39,7 +39,7 @@ class Build:
     """
 
     def __init__(self, context):
-        self.uid = context.scene.session_uid
+        self.uid, self.n_objects = context.scene.session_uid, len(context.scene.objects)
         self.scene = read_scene(context.evaluated_depsgraph_get(), for_render=False)
         if not self.scene.n_primitives:
             raise SceneError(f"{context.scene.name}: it shows no mesh with faces, so there is nothing to build over. Add a mesh, or unhide one.")
@@ -50,7 +50,7 @@ class Build:
         from ..core import build
         index = build(self.scene, self.choice["technique"], self.choice["core"], progress=lambda fraction: progress(0.95 * fraction),
                       **self.choice["parameters"])
-        return session.Built(self.scene, index, index.cells())
+        return session.Built(self.scene, index, index.cells(), self.n_objects)
 
 
 class Trace:

@@ -102,6 +102,12 @@ def current():
     return _current if _current is not None and _current.running else None
 
 
+def check_idle():
+    """Raise a RayscopeError while a job runs."""
+    if current() and not _current.cancelled:
+        raise RayscopeError(f"{_current.title} is still running: wait for it, or press Esc to stop it.")
+
+
 def start(title, function):
     """Start a job in its thread.
 
@@ -111,8 +117,7 @@ def start(title, function):
         While another one runs.
     """
     global _current
-    if current():
-        raise RayscopeError(f"{_current.title} is still running: wait for it, or press Esc to stop it.")
+    check_idle()
     _current = Job(title, function).start()
     return _current
 

@@ -17,10 +17,14 @@ def forget_everything(*_):
 
 @persistent
 def note_changes(scene, depsgraph):
-    """A structure does not fit a scene whose geometry has changed since."""
-    uid = scene.session_uid
-    if any(u.is_updated_geometry or (u.is_updated_transform and isinstance(u.id, bpy.types.Object) and u.id.type not in {"CAMERA", "LIGHT"})
-           for u in depsgraph.updates) and session.mark_stale(uid):
+    """A structure does not fit a scene whose objects have changed since."""
+    built = session.built_of(scene)
+    if built is None or built.stale:
+        return
+    built.stale = len(scene.objects) != built.n_objects or any(
+        isinstance(u.id, bpy.types.Object) and u.id.type not in {"CAMERA", "LIGHT"} and (u.is_updated_geometry or u.is_updated_transform)
+        for u in depsgraph.updates)
+    if built.stale:
         overlay.redraw()
 
 

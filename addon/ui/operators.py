@@ -28,6 +28,7 @@ class Work:
 
     def invoke(self, context, event):
         try:
+            work.check_idle()
             self._task = self.prepare(context)
             self._interactive = True
             if self._task.estimate.seconds <= ASK_SECONDS:
@@ -46,6 +47,7 @@ class Work:
         try:
             if getattr(self, "_interactive", False):  # the dialog's "go ahead"
                 return self._start(context)
+            work.check_idle()
             task = self.prepare(context)
             if task.estimate.seconds > ASK_SECONDS:
                 print("Rayscope:", *task.estimate.lines())
@@ -62,7 +64,7 @@ class Work:
 
     def _start(self, context):
         self._job = work.start(self.title, self._task)
-        self._shown = 0.0
+        self._shown, self._last, self._pause = 0.0, 0.0, REFRESH
         manager = context.window_manager
         self._timer = manager.event_timer_add(TICK, window=context.window)
         self._window = context.window
@@ -78,8 +80,14 @@ class Work:
         if job.cancelled or not job.running:
             self._leave(context)
             return self._end(self._task, job)
-        if event.type == "TIMER" and job.seconds - self._shown > REFRESH:
-            self._shown = job.seconds
+        if event.type != "TIMER":
+            return {"PASS_THROUGH"}
+        now = job.seconds
+        # Where redraws are slow (a huge picture, no graphics card) they are made rarer, lest they take all the time.
+        self._pause = max(REFRESH, 0.9 * self._pause, 4.0 * (now - self._last - TICK))
+        self._last = now
+        if now - self._shown > self._pause:
+            self._shown = now
             context.window_manager.progress_update(job.fraction)
             context.workspace.status_text_set(f"{self.title}: {job.fraction:.0%}, Esc stops it")
             self.show(self._task)

@@ -46,10 +46,18 @@ def draw_figures(layout, scene):
     column = layout.column(align=True)
     for name in FIGURES:
         if name in figures:
-            row = column.row()
-            left, right = row.row(), row.row()
-            left.alignment, right.alignment = "LEFT", "RIGHT"
-            row.prop(scene.rayscope.figures, name, emboss=False)
+            column.prop(scene.rayscope.figures, name, emboss=False)
+    rays = session.rays_of(scene)
+    if rays:
+        counted = [name for name in ("N_IT", "N_TS") if all(name in row for row in rays.values())]
+        table = layout.grid_flow(row_major=True, columns=2 + len(counted), even_columns=False, align=True)
+        for text in ("Rays", "", *counted):
+            table.label(text=text)
+        for kind, row in rays.items():
+            table.label(text=kind.title())
+            table.label(text=f"{row['rays']:,}")
+            for name in counted:
+                table.label(text=f"{row[name]:.3g}")
 
 
 def draw_overlay(layout, scene):
@@ -239,6 +247,6 @@ class RAYSCOPE_VIEWLAYER_PT_passes(Properties, bpy.types.Panel):
 
 
 register, unregister = bpy.utils.register_classes_factory((
-    RAYSCOPE_PT_structure, RAYSCOPE_PT_figures, RAYSCOPE_PT_overlay, RAYSCOPE_PT_trace, RAYSCOPE_PT_notices,
+    RAYSCOPE_PT_structure, RAYSCOPE_PT_overlay, RAYSCOPE_PT_trace, RAYSCOPE_PT_figures, RAYSCOPE_PT_notices,
     RAYSCOPE_RENDER_PT_structure, RAYSCOPE_RENDER_PT_trace, RAYSCOPE_RENDER_PT_figures, RAYSCOPE_RENDER_PT_notices,
     RAYSCOPE_VIEWLAYER_PT_passes))

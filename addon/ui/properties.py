@@ -78,7 +78,8 @@ def _figure(name):
     def get(self):
         value = session.figures_of(self.id_data).get(name)
         return "" if value is None else shown(name, value)
-    return StringProperty(name=name, description=FIGURES[name][:1].upper() + FIGURES[name][1:], get=get)
+    return StringProperty(name=name, description=FIGURES[name][:1].upper() + FIGURES[name][1:], get=get,
+                          set=lambda self, text: None)  # without a setter Blender greys the text out
 
 
 RAYSCOPE_PG_figures = _group("RAYSCOPE_PG_figures", {name: _figure(name) for name in FIGURES})
@@ -101,7 +102,7 @@ class RAYSCOPE_PG_overlay(bpy.types.PropertyGroup):
         ("LEVEL", "Level", "Levels below the root"),
         ("COUNT", "Primitives", "References to primitives in the cell or below it, on a logarithmic scale"),
         ("COST", "Cost", "Expected tests for a random ray that meets the root, on a logarithmic scale")))
-    opacity: FloatProperty(name="Opacity", description="How opaque the lines are", default=0.6, min=0.0, max=1.0, subtype="FACTOR", update=_redraw)
+    opacity: FloatProperty(name="Opacity", description="How opaque the lines are", default=0.8, min=0.0, max=1.0, subtype="FACTOR", update=_redraw)
     in_front: BoolProperty(name="In Front", description="Draw the lines through the surfaces that hide them", default=True, update=_redraw)
 
     def selection(self):

@@ -28,7 +28,7 @@ def pictures(script, folder, arguments=(), timeout=240):
         pytest.skip(why_not)
     user = Path(folder, "user")
     user.mkdir()
-    inside = ["--factory-startup", "--window-geometry", "0", "0", "1280", "800", "--python-exit-code", "1", "--python", HERE / "inside.py"]
+    inside = ["--factory-startup", "--enable-event-simulate", "--window-geometry", "0", "0", "1280", "800", "--python-exit-code", "1", "--python", HERE / "inside.py"]
     done = subprocess.run(
         [*command, *map(str, inside), "--", str(HERE / script), str(folder), *map(str, arguments)],
         env={**os.environ, "BLENDER_USER_RESOURCES": str(user), "HOME": str(folder)},

@@ -1,0 +1,158 @@
+"""Overlays: the arrays without the graphics card, then the lines that are drawn from them."""
+import time
+
+import bpy
+import gpu
+import numpy as np
+import pytest
+from bl_ext.user_default.rayscope.addon.show import overlay, overlay_data
+from bl_ext.user_default.rayscope.core.hits import Cells
+from mathutils import Matrix
+
+
+def tree(depth=3):
+    """A binary tree over the unit cube, halved along x; every third leaf is empty."""
+    lo, hi, level, count, leaf, parent = [], [], [], [], [], []
+    for d in range(depth + 1):
+        for k in range(2**d):
+            lo.append((k / 2**d, 0, 0))
+            hi.append(((k + 1) / 2**d, 1, 1))
+            level.append(d)
+            leaf.append(d == depth)
+            count.append((0 if k % 3 == 0 else k + 1) if d == depth else 2 ** (depth - d) * 4)
+            parent.append((len(lo) - 2) // 2 if d else -1)
+    return Cells.make(lo, hi, level, count, leaf, parent)
+
+
+def many(n=100_000):
+    rng = np.random.default_rng(1)
+    lo = rng.random((n, 3))
+    return Cells.make(lo, lo + rng.random((n, 3)) * 0.01, rng.integers(0, 20, n), rng.integers(0, 9, n), rng.random(n) < 0.5, np.arange(n) - 1)
+
+
+def test_selection():
+    cells = tree()
+    assert len(overlay_data.select(cells)) == 15
+    assert set(cells.level[overlay_data.select(cells, levels=(1, 2))]) == {1, 2} and len(overlay_data.select(cells, levels=(1, 2))) == 6
+    leaves = overlay_data.select(cells, leaves_only=True)
+    assert len(leaves) == 8 and cells.leaf[leaves].all()
+    full = overlay_data.select(cells, leaves_only=True, empty=False)
+    assert len(full) == 5 and (cells.count[full] > 0).all()
+    assert len(overlay_data.select(cells, levels=(5, 3))) == 0
+
+
+def test_viridis_is_linear_and_gets_lighter():
+    colours = overlay_data.colour_map()
+    assert colours.dtype == np.float32 and colours.shape == (256, 3)
+    np.testing.assert_allclose(colours[0], overlay_data.linear(np.array([0x44, 0x01, 0x54]) / 255), atol=1e-6)
+    np.testing.assert_allclose(colours[-1], overlay_data.linear(np.array([0xFD, 0xE7, 0x25]) / 255), atol=1e-6)
+    luminance = colours @ [0.2126, 0.7152, 0.0722]
+    assert (np.diff(luminance) > -1e-4).all()
+    assert overlay_data.linear(0.5) == pytest.approx(0.21404, abs=1e-5)
+
+
+@pytest.mark.parametrize("by", overlay_data.COLOUR_BY)
+def test_colours_span_the_map_and_do_not_change_with_the_levels_shown(by):
+    cells = tree()
+    everything = np.arange(len(cells))
+    place = overlay_data.place(cells, everything, by)
+    assert place.min() == 0.0 and place.max() == pytest.approx(1.0)
+    some = overlay_data.select(cells, levels=(1, 2))
+    np.testing.assert_array_equal(overlay_data.place(cells, some, by), place[some])
+    order = np.argsort(overlay_data.values(cells, by), kind="stable")
+    assert (np.diff(place[order]) >= -1e-6).all(), "a higher value must not have a darker colour"
+
+
+def test_one_level_or_nothing_has_colours_too():
+    single = Cells.make([(0, 0, 0)], [(1, 1, 1)], [0], [0], [True], [-1])
+    for by in overlay_data.COLOUR_BY:
+        texels, n = overlay_data.boxes(single, by=by)
+        assert n == 1 and np.isfinite(texels).all()
+    none = Cells.make([], [], [], [], [], [])
+    for by in overlay_data.COLOUR_BY:
+        texels, n = overlay_data.boxes(none, by=by)
+        assert n == 0 and texels.shape == (1, 3 * overlay_data.CELLS_PER_ROW, 4)
+
+
+def test_texels():
+    cells = many(2500)
+    texels, n = overlay_data.boxes(cells, levels=(3, 9), by="COUNT", opacity=0.25)
+    index = overlay_data.select(cells, (3, 9))
+    assert n == len(index) and texels.dtype == np.float32 and texels.shape[1:] == (3072, 4)
+    flat = texels.reshape(-1, 3, 4)
+    np.testing.assert_array_equal(flat[:n, 0, :3], cells.lo[index].astype(np.float32))
+    np.testing.assert_array_equal(flat[:n, 1, :3], cells.hi[index].astype(np.float32))
+    assert (flat[:n, 2, 3] == 0.25).all() and not flat[n:].any()
+
+
+def test_a_hundred_thousand_boxes_in_50_ms():
+    cells = many()
+    for selection in ({}, {"levels": (2, 12), "leaves_only": True, "empty": False, "by": "COST"}):
+        times = []
+        for _ in range(12):
+            start = time.perf_counter()
+            overlay_data.boxes(cells, **selection)
+            times.append(time.perf_counter() - start)
+        assert min(times) < 0.05, times
+
+
+def with_gpu(function):
+    """Call it where gpu works without a window: 5.2 has gpu.init; 4.5 only a render engine that asks for it."""
+    if hasattr(gpu, "init"):
+        gpu.init()
+        return function()
+    box = []
+
+    class Engine(bpy.types.RenderEngine):
+        bl_idname, bl_label, bl_use_gpu_context = "RAYSCOPE_TEST", "Test", True
+
+        def render(self, depsgraph):
+            try:
+                box.append(function())
+            finally:
+                overlay.release()
+
+    bpy.utils.register_class(Engine)
+    try:
+        scene = bpy.context.scene
+        engine, scene.render.engine = scene.render.engine, "RAYSCOPE_TEST"
+        scene.render.resolution_x = scene.render.resolution_y = 8
+        bpy.ops.render.render()
+        scene.render.engine = engine
+    finally:
+        bpy.utils.unregister_class(Engine)
+    return box[0]
+
+
+def test_lines_are_drawn_where_and_as_they_should():
+    """An orthographic view along -z of one box, over a picture."""
+    cells = Cells.make([(-0.5, -0.25, 0)], [(0.5, 0.25, 0.5)], [0], [3], [True], [-1])
+    texels, n = overlay_data.boxes(cells, opacity=0.5)
+    pixels = np.full((64, 64, 4), (0.2, 0.4, 0.6, 1.0), np.float32)
+    flip = Matrix.Scale(-1.0, 4, (0, 0, 1))  # clip space's z points away
+    drawn = with_gpu(lambda: overlay.picture(pixels, texels, n, flip))
+    changed = (np.abs(drawn - pixels) > 1e-3).any(axis=-1)
+    rows, columns = np.flatnonzero(changed.any(axis=1)), np.flatnonzero(changed.any(axis=0))
+    assert (rows.min(), rows.max()) == pytest.approx((24, 40), abs=1) and (columns.min(), columns.max()) == pytest.approx((16, 48), abs=1)
+    assert changed.sum() == pytest.approx(2 * 32 + 2 * 16, abs=8), "the outline and nothing else"
+    # The twelve edges coincide in pairs, so a line is drawn once or twice (or four times where three meet).
+    purple = overlay_data.colour_map()[0]
+    once = 0.5 * pixels[0, 0, :3] + 0.5 * purple
+    twice = 0.5 * once + 0.5 * purple
+    middle = drawn[changed][:, :3]
+    near = np.minimum(np.abs(middle - once).max(axis=1), np.abs(middle - twice).max(axis=1))
+    assert np.median(near) < 2e-3, "colours are linear and mixed with the opacity"
+    np.testing.assert_allclose(drawn[0, 0], pixels[0, 0], atol=1e-3)
+
+
+def test_thousands_of_boxes_are_all_drawn():
+    """More than one row of the texture: a grid of separate boxes, each with some pixel lit."""
+    side = 40
+    k = np.arange(side * side)
+    corner = np.stack([k % side, k // side, 0 * k], axis=-1) / side * 2 - 1 + 0.25 / side
+    cells = Cells.make(corner, corner + 1.5 / side, 0 * k, 0 * k + 1, 0 * k == 0, 0 * k - 1)
+    texels, n = overlay_data.boxes(cells)
+    assert len(texels) == 2
+    drawn = with_gpu(lambda: overlay.picture(np.zeros((400, 400, 4)), texels, n, Matrix.Identity(4)))
+    lit = (drawn[..., :3] > 0).any(axis=-1).reshape(side, 10, side, 10).any(axis=(1, 3))
+    assert lit.all(), f"{(~lit).sum()} boxes are missing"
