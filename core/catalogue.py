@@ -62,6 +62,17 @@ class Technique:
 LEAF_SIZE = Parameter("leaf_size", 2, "A leaf holds at most this many primitives where it can be divided",
                       low=1, high=1024)
 
+MAILBOX = Parameter("mailbox", True, "No primitive is tested twice with a ray, however many cells it is in")
+LISTS = Parameter("lists", "own", "Whether cells with the same primitives share one list, which is tested once a ray",
+                  choices=("own", "shared"))
+GRID = (
+    Parameter("walk", "exact", "How the planes' parameters are advanced", choices=("subtract", "add", "exact")),
+    Parameter("rule", "woo", "Cells for a density: cubic, fewer in flat scenes (woo); equally many along each axis; cubic, always as many",
+              choices=("woo", "regular", "heterogeneous")),
+    Parameter("density", 4.0, "Cells per primitive", low=1e-3, high=1000.0),
+    Parameter("resolution", 0, "Cells along the longest axis; 0 means by density", low=0, high=4096),
+)
+
 TECHNIQUES = (
     Technique("brute", "Brute Force", "hierarchies", "brute", "Brute",
               "Whitted 1980", "Every ray is tested against every primitive"),
@@ -70,19 +81,14 @@ TECHNIQUES = (
               "A tree of axis-aligned boxes around the primitives",
               parameters=(
                   Parameter("builder", {"pure": "sah", "fast": "ploc"}, "How the tree is built",
-                            choices=("sah", "ploc"), only=(("ploc", "fast"),)),
+                            choices=("sah", "sweep", "median", "lbvh", "ploc"), only=(("sweep", "fast"), ("median", "fast"), ("lbvh", "fast"), ("ploc", "fast"))),
                   Parameter("leaf_size", {"pure": 2, "fast": 1},
                             "A leaf holds at most this many primitives where it can be divided", low=1, high=1024),
               )),
     Technique("grid", "Uniform Grid", "subdivision", "grid", "Grid",
               "Fujimoto et al. 1986; Amanatides and Woo 1987",
               "Equal cells, walked with a 3D digital differential analyser",
-              parameters=(
-                  Parameter("walk", "exact", "How the planes' parameters are advanced",
-                            choices=("subtract", "add", "exact")),
-                  Parameter("density", 4.0, "Cells per primitive", low=1e-3, high=1000.0),
-                  Parameter("resolution", 0, "Cells along the longest axis; 0 means by density", low=0, high=4096),
-              )),
+              parameters=(*GRID, MAILBOX, LISTS)),
     Technique("octree", "Octree", "subdivision", "octree", "Octree",
               "Glassner 1984; Samet 2006",
               "Cells halved along all three axes at once",

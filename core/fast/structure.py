@@ -29,11 +29,14 @@ class Structure:
     parameters : dict
     figures : dict
         Filled by :meth:`build`: N_G, N_E, N_EE, N_ER, depth, memory, c_SAH, as far as they make sense.
+    notices : list of Notice
+        What the build could not do as asked, a guard that stopped it, for example.
     """
 
     def __init__(self, primitives, parameters, progress=None):
         self.primitives, self.parameters = primitives, parameters
         self.figures = {"N": primitives.n, "memory": 0}
+        self.notices = []
         if primitives.n:
             self.build(progress or no_progress, **parameters)
             self.figures["memory"] += sum(s.figures["memory"] for s in primitives.structures())

@@ -12,8 +12,16 @@ from .tree import BinaryTree
 WINDOW = 4
 
 
-def morton_order(boxes):
-    """Order of boxes (6, n) in unit space along a Morton curve through their centres, 11 bits an axis."""
+def morton_keys(boxes):
+    """Boxes (6, n) of unit space along a Morton curve through their centres.
+
+    Returns
+    -------
+    key : ndarray of uint64
+        Ascending and different: 11 bits an axis, then the box's number.
+    order : ndarray of int64
+        Those numbers.
+    """
     n = boxes.shape[1]
     code = np.zeros(n, np.uint64)
     for axis in range(3):
@@ -24,7 +32,7 @@ def morton_order(boxes):
     # The index in the low bits makes a plain sort do the work of argsort, several times faster.
     key = code << bits | np.arange(n, dtype=np.uint64)
     key.sort()
-    return (key & ((np.uint64(1) << bits) - np.uint64(1))).astype(np.int64)
+    return key, (key & ((np.uint64(1) << bits) - np.uint64(1))).astype(np.int64)
 
 
 def _spread(x):
@@ -48,7 +56,7 @@ def build(boxes, progress):
     BinaryTree
     """
     n = boxes.shape[1]
-    order = morton_order(boxes)
+    order = morton_keys(boxes)[1]
     m = 2 * n - 1
     tree_boxes = np.empty((6, m), np.float32)
     box = boxes[:, order]

@@ -1,0 +1,285 @@
+"""Uniform grid: equal cells, walked with a 3D digital differential analyser, all rays of a batch in lock step.
+
+Fujimoto, Tanaka and Iwata (1986); Amanatides and Woo (1987).
+"""
+
+import math
+
+import numpy as np
+
+from ...errors import MemoryEstimateError
+from ...hits import Cells, box_area
+from ...memory import free_memory
+from ..structure import Structure
+from .box import EPSILON, through_box
+from .lists import Lists, Visits, ranges
+
+#: Bytes a cell takes while the grid is built, and bytes a reference takes.
+CELL_BYTES, REFERENCE_BYTES = 24, 24
+#: Part of a cell's edge by which cells overlap, so that a walk off by rounding errors meets every primitive all the same.
+OVERLAP = 2.0**-20
+#: Pairs of a primitive and a cell looked at together in the build.
+PAIRS = 262_144
+
+
+class Grid(Structure):
+    """The grid.
+
+    Attributes
+    ----------
+    lo, hi : ndarray, shape (3,)
+        Its box: the scene's, larger by `margin`.
+    resolution : ndarray, shape (3,), int
+    width : ndarray, shape (3,)
+        Of a cell.
+    lists : Lists
+        Of the cells; z runs fastest.
+    margin : float
+        How far primitives outside a cell are still listed in it.
+    """
+
+    def build(self, progress, walk, rule, density, resolution, mailbox, lists):
+        self._lay_out(rule, density, resolution)
+        cell, item = self._entries(progress)
+        self.lists = Lists(cell, item, math.prod(self.resolution.tolist()), lists == "shared")
+        self._measure()
+
+    def _lay_out(self, rule, density, resolution):
+        """Choose resolution and box."""
+        p = self.primitives
+        lo, hi = p.lo.min(axis=0), p.hi.max(axis=0)
+        size = (hi - lo).tolist()
+        self.resolution = np.array(cells_along(size, p.n, rule, density, resolution))
+        self._refuse_too_many(size, rule, density, resolution)
+        edges = ((hi - lo) / self.resolution)[self.resolution > 1]
+        self.margin = max(OVERLAP * float(edges.min(initial=np.inf)) if len(edges) else 0.0,
+                          64.0 * EPSILON * float(np.abs([lo, hi]).max()), 1e-300)
+        self.lo, self.hi = lo - self.margin, hi + self.margin
+        self.width = (self.hi - self.lo) / self.resolution
+        self.stride = np.array([self.resolution[1] * self.resolution[2], self.resolution[2], 1])
+
+    def _refuse_too_many(self, size, rule, density, resolution):
+        """Raise before anything is allocated that would not fit into half of the free memory."""
+        most = int(min(0.5 * free_memory() / CELL_BYTES, 2**31 - 1))
+        cells = math.prod(self.resolution.tolist())
+        if cells > most:
+            raise MemoryEstimateError(too_many(self.resolution.tolist(), most, size, self.primitives.n, rule, density, resolution))
+
+    def _entries(self, progress):
+        """Pairs (cell, item): which primitives reach into which cells."""
+        p = self.primitives
+        first, last = self._index(p.lo - self.margin), self._index(p.hi + self.margin)
+        extent = last - first + 1
+        # A primitive is in one piece: where its box is one cell wide along two axes, it is in all of the row's cells.
+        sure = (extent > 1).sum(axis=1) <= 1
+        count = extent.prod(axis=1)
+        limit = 0.5 * free_memory() / REFERENCE_BYTES
+        cells, items, total = [], [], 0
+        order = np.concatenate([np.flatnonzero(sure), np.flatnonzero(~sure)])
+        ends = np.cumsum(count[order])
+        begin, done = 0, int(sure.sum())
+        while begin < p.n:
+            # One primitive may reach into more cells than are looked at together.
+            end = max(begin + 1, int(np.searchsorted(ends, (ends[begin - 1] if begin else 0) + PAIRS, side="right")))
+            if begin < done:
+                end = min(end, done)
+            some = order[begin:end]
+            for piece in range(0, int(count[some].sum()), PAIRS) if len(some) == 1 else (0,):
+                cell, item = self._reached(some, first, extent, count, piece, begin < done)
+                cells.append(cell)
+                items.append(item)
+                total += len(cell)
+            if total > limit:
+                raise MemoryEstimateError(f"grid: {' x '.join(map(str, self.resolution))} cells would hold more than {int(limit)} references to "
+                                          f"primitives, which is what fits. Set resolution to {int(self.resolution.max()) // 2} or less.")
+            begin = end
+            progress(begin / p.n)
+        return np.concatenate(cells), np.concatenate(items)
+
+    def _reached(self, some, first, extent, count, piece, sure):
+        """The cells that some primitives reach into; of a single one, only PAIRS cells from number `piece` on are looked at."""
+        item = np.repeat(some, count[some])
+        place = ranges(np.zeros(len(some), np.int64), count[some])
+        if len(some) == 1:
+            item, place = item[piece:piece + PAIRS], place[piece:piece + PAIRS]
+        ey, ez = extent[item, 1], extent[item, 2]
+        x, rest = np.divmod(place, ey * ez)
+        y, z = np.divmod(rest, ez)
+        index = first[item] + np.stack([x, y, z], axis=1)
+        if not sure:
+            inside = self.primitives.overlaps(item, self._plane(index) - self.margin, self._plane(index + 1) + self.margin)
+            index, item = index[inside], item[inside]
+        return index @ self.stride, item
+
+    def _index(self, x):
+        """The cells of coordinates, shape (n, 3); one outside belongs to the nearest cell."""
+        return np.clip(((x - self.lo) / self.width), 0, self.resolution - 1).astype(np.int64)
+
+    def _plane(self, k):
+        """The coordinates of the planes below the k-th cells, shape (n, 3)."""
+        return self.lo + k * self.width
+
+    def _measure(self):
+        """Fill in the figures."""
+        lists = self.lists
+        references = int(lists.count.sum())
+        area = box_area(np.array([self.lo, np.zeros(3)]), np.array([self.hi, self.width]))
+        self.figures.update(
+            N_G=0, N_E=len(lists.count), N_EE=int((lists.count == 0).sum()), N_ER=references, depth=1,
+            c_SAH=float(area[1] * references / area[0]) if area[0] > 0.0 else 0.0, memory=lists.nbytes)
+        if lists.list_of is not None:
+            self.figures["N_L"] = lists.lists
+
+    def visits(self, query):
+        """What rays do in cells."""
+        return Visits(self.lists, query, self.primitives.n, self.parameters["mailbox"])
+
+    def traverse(self, rays, query):
+        """From cell to cell along the rays; see :class:`Walk`."""
+        visits = self.visits(query)
+        t_in, t_out, slack = through_box(rays, self.lo, self.hi, query.t)
+        inside = t_in <= t_out
+        # These rays come from so far away that their own rounding errors are as large as cells overlap.
+        far = inside & (slack > 0.5 * self.margin)
+        if far.any():
+            visits.everything(np.flatnonzero(far))
+        ray = np.flatnonzero(inside & ~far)
+        if len(ray):
+            with np.errstate(over="ignore", invalid="ignore"):
+                self.walk(Walk(self, rays, ray, t_in), visits, query)
+
+    def walk(self, walk, visits, query):
+        """Visit cells until the nearest hit lies before the current cell's exit, or the grid ends."""
+        ray = walk.ray
+        while len(ray):
+            t_out, axis = walk.exit(ray)
+            visits.enter(ray, walk.cell.take(ray))
+            on = np.flatnonzero(query.t.take(ray) > t_out)
+            ray = walk.advance(ray.take(on), axis.take(on), t_out.take(on))
+
+    def cells(self):
+        """The whole box, then every cell."""
+        if not self.primitives.n:
+            return super().cells()
+        n = len(self.lists.count)
+        index = np.stack(np.unravel_index(np.arange(n), tuple(self.resolution)), axis=1)
+        return Cells.make(np.concatenate([[self.lo], self._plane(index)]), np.concatenate([[self.hi], self._plane(index + 1)]),
+                          np.concatenate([[0], np.ones(n)]), np.concatenate([[self.figures["N_ER"]], self.lists.count]),
+                          np.concatenate([[False], np.ones(n, bool)]), np.concatenate([[-1], np.zeros(n)]))
+
+
+class Walk:
+    """3D-DDA of a batch of rays; all arrays have one entry a ray and axis, axis by axis, or one a ray.
+
+    `D` is the parameter distance between two planes, `L` that from `start` to the next plane: the least L says which
+    plane is crossed next. How L is advanced is the parameter `walk`:
+
+    subtract
+        The classic form: what was walked is taken from all three.
+    add
+        Amanatides and Woo.
+    exact
+        From the plane's index: nothing accumulates.
+    """
+
+    def __init__(self, grid, rays, ray, t_in):
+        self.grid, self.ray, self.n, self.how = grid, ray, rays.n, grid.parameters["walk"]
+        n = rays.n
+        t_in = np.where(np.isfinite(t_in), t_in, 0.0)
+        entry = rays.o + t_in * rays.d
+        index = grid._index(entry.T).T
+        up = rays.d > 0.0
+        self.cell = grid.stride @ index
+        self.step = np.where(up, 1, -1)
+        self.leap = (self.step * grid.stride[:, None]).ravel()
+        # Steps left until the grid ends, and the number of the plane to be crossed next.
+        self.left = np.where(up, grid.resolution[:, None] - index, index + 1).ravel()
+        self.plane = (index + up).astype(float).ravel()
+        self.step = self.step.astype(float).ravel()
+        self.inverse = rays.inverse.ravel()
+        # A component this small leads to no other cell; its plane is never crossed.
+        self.moves = np.isfinite(self.inverse)
+        self.start = np.zeros(n) if self.how == "exact" else t_in.copy()
+        self.seen_from = (rays.o if self.how == "exact" else entry).ravel()
+        self.D = np.repeat(grid.width, n) * np.abs(self.inverse)
+        everywhere = np.arange(3 * n)
+        self.L = self.distance(everywhere, everywhere // n)
+
+    def distance(self, place, axis):
+        """L of some rays and axes."""
+        grid = self.grid
+        plane = grid.lo.take(axis) + self.plane.take(place) * grid.width.take(axis)
+        distance = (plane - self.seen_from.take(place)) * self.inverse.take(place)
+        return np.where(self.moves.take(place), distance, np.inf)
+
+    def exit(self, ray):
+        """Where rays leave their cells: t, and the axis of the plane crossed."""
+        x, y, z = self.L.take(ray), self.L.take(ray + self.n), self.L.take(ray + 2 * self.n)
+        nearest = np.minimum(np.minimum(x, y), z)
+        axis = np.where(x == nearest, 0, np.where(y == nearest, 1, 2))
+        return (nearest if self.how == "exact" else nearest + self.start.take(ray)), axis
+
+    def advance(self, ray, axis, t_out):
+        """Take rays to their next cells; those still in the grid."""
+        place = axis * self.n + ray
+        left = self.left.take(place) - 1
+        on = np.flatnonzero(left > 0)
+        ray, axis, place, t_out = ray.take(on), axis.take(on), place.take(on), t_out.take(on)
+        self.left[place] = left.take(on)
+        self.cell[ray] += self.leap.take(place)
+        self.plane[place] += self.step.take(place)
+        if self.how == "exact":
+            self.L[place] = self.distance(place, axis)
+        elif self.how == "add":
+            self.L[place] += self.D.take(place)
+        else:
+            nearest = self.L.take(place)
+            for a in range(3):
+                self.L[ray + a * self.n] -= nearest
+            self.L[place] = self.D.take(place)
+            self.start[ray] = t_out
+        return ray
+
+
+def cells_along(size, n, rule, density, resolution):
+    """Cells along each axis.
+
+    Parameters
+    ----------
+    size : sequence of 3 float
+        Of the scene's box.
+    n : int
+        Number of primitives.
+    rule : {"woo", "regular", "heterogeneous"}
+        With M = density * n: M**(1/3) cells along the longest axis and cubic cells (Woo 1992), so fewer than M in a
+        scene that is no cube; M**(1/3) along every axis; or cubic cells, about M in all.
+    density : float
+        Cells per primitive.
+    resolution : int
+        Cells along the longest axis, whatever the density; 0 for none.
+    """
+    longest = max(size)
+    if not longest > 0.0:
+        return [1, 1, 1]
+    along = resolution or (density * n) ** (1 / 3)
+    if rule == "regular":
+        return [max(1, int(along)) if s > 0.0 else 1 for s in size]
+    shape = [s / longest for s in size]
+    if rule == "heterogeneous" and not resolution:
+        # Axes thinner than a cell get one, and the others share the rest.
+        wide = [s for s in shape if s > 0.0]
+        while wide:
+            along = (density * n / math.prod(wide)) ** (1 / len(wide))
+            if min(wide) * along >= 1.0 or len(wide) == 1:
+                break
+            wide.remove(min(wide))
+    return [max(1, int(s * along)) for s in shape]
+
+
+def too_many(cells, most, size, n, rule, density, resolution):
+    """The message that a grid would not fit, with the resolution that would."""
+    fits = max(cells)
+    while fits > 1 and math.prod(cells_along(size, n, rule, density, fits)) > most:
+        fits = fits * 15 // 16
+    return (f"grid: {' x '.join(map(str, cells))} cells are more than the {most} that fit into memory. "
+            f"Set resolution to {fits} or less.")
