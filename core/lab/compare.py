@@ -18,10 +18,10 @@ from .rays import extent, ray_sets
 from . import report
 
 #: Tests of brute force that the check may take: a few seconds.
-CHECK_TESTS = 3e7
+CHECK_TESTS = 1e7
 
 #: Seconds a test takes, roughly, and the seconds brute force may take unless it is asked for by name.
-TEST_SECONDS = {"fast": 6e-8, "pure": 2e-6}
+TEST_SECONDS = {"fast": 2e-7, "pure": 1.5e-6}
 BRUTE_SECONDS = 20.0
 
 #: A technique that takes longer than this is timed once.
