@@ -10,6 +10,7 @@ FIGURES = {
     "N_E": "elementary cells: leaves",
     "N_EE": "empty elementary cells",
     "N_ER": "references to primitives from elementary cells",
+    "N_L": "lists of primitives, where cells share them",
     "depth": "levels below the root",
     "memory": "bytes of the structure",
     "c_SAH": "SAH cost, c_T = c_I = 1",

@@ -7,6 +7,7 @@ import math
 
 import numpy as np
 
+from ...cells import GRID_OVERLAP, cells_along, too_many
 from ...errors import MemoryEstimateError
 from ...hits import Cells, box_area
 from ...memory import free_memory
@@ -16,8 +17,6 @@ from .lists import Lists, Visits, ranges
 
 #: Bytes a cell takes while the grid is built, and bytes a reference takes.
 CELL_BYTES, REFERENCE_BYTES = 24, 24
-#: Part of a cell's edge by which cells overlap, so that a walk off by rounding errors meets every primitive all the same.
-OVERLAP = 2.0**-20
 #: Pairs of a primitive and a cell looked at together in the build.
 PAIRS = 262_144
 
@@ -50,20 +49,20 @@ class Grid(Structure):
         lo, hi = p.lo.min(axis=0), p.hi.max(axis=0)
         size = (hi - lo).tolist()
         self.resolution = np.array(cells_along(size, p.n, rule, density, resolution))
-        self._refuse_too_many(size, rule, density, resolution)
+        self._refuse_too_many(size, rule, density)
         edges = ((hi - lo) / self.resolution)[self.resolution > 1]
-        self.margin = max(OVERLAP * float(edges.min(initial=np.inf)) if len(edges) else 0.0,
+        self.margin = max(GRID_OVERLAP * float(edges.min(initial=np.inf)) if len(edges) else 0.0,
                           64.0 * EPSILON * float(np.abs([lo, hi]).max()), 1e-300)
         self.lo, self.hi = lo - self.margin, hi + self.margin
         self.width = (self.hi - self.lo) / self.resolution
         self.stride = np.array([self.resolution[1] * self.resolution[2], self.resolution[2], 1])
 
-    def _refuse_too_many(self, size, rule, density, resolution):
+    def _refuse_too_many(self, size, rule, density):
         """Raise before anything is allocated that would not fit into half of the free memory."""
         most = int(min(0.5 * free_memory() / CELL_BYTES, 2**31 - 1))
         cells = math.prod(self.resolution.tolist())
         if cells > most:
-            raise MemoryEstimateError(too_many(self.resolution.tolist(), most, size, self.primitives.n, rule, density, resolution))
+            raise MemoryEstimateError(too_many("grid", self.resolution.tolist(), most, size, self.primitives.n, rule, density))
 
     def _entries(self, progress):
         """Pairs (cell, item): which primitives reach into which cells."""
@@ -239,47 +238,3 @@ class Walk:
             self.L[place] = self.D.take(place)
             self.start[ray] = t_out
         return ray
-
-
-def cells_along(size, n, rule, density, resolution):
-    """Cells along each axis.
-
-    Parameters
-    ----------
-    size : sequence of 3 float
-        Of the scene's box.
-    n : int
-        Number of primitives.
-    rule : {"woo", "regular", "heterogeneous"}
-        With M = density * n: M**(1/3) cells along the longest axis and cubic cells (Woo 1992), so fewer than M in a
-        scene that is no cube; M**(1/3) along every axis; or cubic cells, about M in all.
-    density : float
-        Cells per primitive.
-    resolution : int
-        Cells along the longest axis, whatever the density; 0 for none.
-    """
-    longest = max(size)
-    if not longest > 0.0:
-        return [1, 1, 1]
-    along = resolution or (density * n) ** (1 / 3)
-    if rule == "regular":
-        return [max(1, int(along)) if s > 0.0 else 1 for s in size]
-    shape = [s / longest for s in size]
-    if rule == "heterogeneous" and not resolution:
-        # Axes thinner than a cell get one, and the others share the rest.
-        wide = [s for s in shape if s > 0.0]
-        while wide:
-            along = (density * n / math.prod(wide)) ** (1 / len(wide))
-            if min(wide) * along >= 1.0 or len(wide) == 1:
-                break
-            wide.remove(min(wide))
-    return [max(1, int(s * along)) for s in shape]
-
-
-def too_many(cells, most, size, n, rule, density, resolution):
-    """The message that a grid would not fit, with the resolution that would."""
-    fits = max(cells)
-    while fits > 1 and math.prod(cells_along(size, n, rule, density, fits)) > most:
-        fits = fits * 15 // 16
-    return (f"grid: {' x '.join(map(str, cells))} cells are more than the {most} that fit into memory. "
-            f"Set resolution to {fits} or less.")

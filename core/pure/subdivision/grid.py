@@ -6,15 +6,16 @@ Fujimoto, Tanaka and Iwata (1986); Amanatides and Woo (1987).
 import itertools
 import math
 
+from ...cells import GRID_OVERLAP, cells_along, too_many
 from ...errors import MemoryEstimateError
 from ...hits import Cells
+from ...memory import free_memory
 from ..ray import EPSILON
 from ..structure import Structure, memory_of
+from .lists import Visits, shared
 
-#: More cells than this are refused: half a gigabyte of references to lists.
-CELLS_AT_MOST = 2**26
-#: Part of a cell's edge by which cells overlap, so that a walk off by rounding errors meets every primitive all the same.
-OVERLAP = 2.0**-20
+#: Bytes a cell takes: a reference to its list, and, in some cells, the list.
+CELL_BYTES = 32
 
 
 class Grid(Structure):
@@ -33,42 +34,37 @@ class Grid(Structure):
         How far primitives outside a cell are still listed in it.
     """
 
-    def build(self, progress, walk, density, resolution):
+    def build(self, progress, walk, rule, density, resolution, mailbox, lists):
         primitives = self.primitives
         lo = [min(p.lo[axis] for p in primitives) for axis in range(3)]
         hi = [max(p.hi[axis] for p in primitives) for axis in range(3)]
-        self._choose_resolution(lo, hi, density, resolution)
+        size = [h - l for l, h in zip(lo, hi)]
+        self.resolution = cells_along(size, len(primitives), rule, density, resolution)
+        cells, most = math.prod(self.resolution), int(min(0.5 * free_memory() / CELL_BYTES, 2**31 - 1))
+        if cells > most:
+            raise MemoryEstimateError(too_many("grid", self.resolution, most, size, len(primitives), rule, density))
         edges = [(h - l) / n for l, h, n in zip(lo, hi, self.resolution) if n > 1]
-        self.margin = max(OVERLAP * min(edges, default=0.0), 64.0 * EPSILON * max(map(abs, (*lo, *hi))), 1e-300)
+        self.margin = max(GRID_OVERLAP * min(edges, default=0.0), 64.0 * EPSILON * max(map(abs, (*lo, *hi))), 1e-300)
         self.lo, self.hi = [x - self.margin for x in lo], [x + self.margin for x in hi]
         self.width = [(h - l) / n for l, h, n in zip(self.lo, self.hi, self.resolution)]
         nx, ny, nz = self.resolution
-        self.lists = [()] * (nx * ny * nz)
+        self.lists, self.mail = [()] * (nx * ny * nz), [None] * len(primitives)
         for item, primitive in enumerate(primitives):
             self._enter(item, primitive)
             progress((item + 1) / len(primitives))
+        if lists == "shared":
+            self.lists = shared(self.lists)
         self._measure()
-
-    def _choose_resolution(self, lo, hi, density, resolution):
-        """Cells as cubic as possible, `density` of them a primitive in a cubic scene (Woo's rule), or as many as are asked for."""
-        size = [h - l for l, h in zip(lo, hi)]
-        longest = max(size)
-        along = resolution or (density * len(self.primitives)) ** (1 / 3)
-        self.resolution = [max(1, int(s / longest * along)) if longest > 0.0 else 1 for s in size]
-        if math.prod(self.resolution) > CELLS_AT_MOST:
-            fits = int(along * (CELLS_AT_MOST / math.prod(self.resolution)) ** (1 / 3))
-            raise MemoryEstimateError(
-                f"grid: {' x '.join(map(str, self.resolution))} cells are more than {CELLS_AT_MOST}, which is what fits. "
-                f"Set resolution to {fits} or less.")
 
     def _enter(self, item, primitive):
         """List a primitive in every cell that it reaches into."""
         first = [self._index(axis, primitive.lo[axis] - self.margin) for axis in range(3)]
         last = [self._index(axis, primitive.hi[axis] + self.margin) for axis in range(3)]
         ranges = [range(f, l + 1) for f, l in zip(first, last)]
-        only_one = first == last
+        # A primitive is in one piece: where its box is one cell wide along two axes, it is in all of the row's cells.
+        sure = sum(f != l for f, l in zip(first, last)) <= 1
         for index in itertools.product(*ranges):
-            if only_one or primitive.overlaps([self._plane(axis, index[axis]) - self.margin for axis in range(3)],
+            if sure or primitive.overlaps([self._plane(axis, index[axis]) - self.margin for axis in range(3)],
                                               [self._plane(axis, index[axis] + 1) + self.margin for axis in range(3)]):
                 number = self._number(index)
                 if not self.lists[number]:
@@ -98,6 +94,8 @@ class Grid(Structure):
             N_G=0, N_E=len(self.lists), N_EE=sum(not cell for cell in self.lists), N_ER=references, depth=1,
             c_SAH=(wx * wy + wy * wz + wz * wx) * references / root if root > 0.0 else 0.0,
             memory=memory_of(self.lists))
+        if self.parameters["lists"] == "shared":
+            self.figures["N_L"] = len(set(filter(None, self.lists)))
 
     def walk(self, query):
         """From cell to cell along the ray.
@@ -106,7 +104,7 @@ class Grid(Structure):
         least L says which plane is crossed next. A hit counts only in its own cell: the walk ends once the nearest
         hit lies before the current cell's exit.
         """
-        ray, watch, how = query.ray, query.watch, self.parameters["walk"]
+        ray, how = query.ray, self.parameters["walk"]
         inside = ray.through_box(self.lo, self.hi, query.t)
         if inside is None:
             return
@@ -131,15 +129,13 @@ class Grid(Structure):
 
         D = [width * abs(inverse) for width, inverse in zip(self.width, ray.inverse)]
         L = [distance_to_plane(axis) for axis in range(3)]
+        visits = Visits(self, query)
         while True:
             nearest = min(L)
             axis = L.index(nearest)
             t_out = start + nearest
             number = self._number(cell)
-            if watch:
-                watch.cell(number, t_in, t_out, leaf=True, empty=not self.lists[number])
-            for item in self.lists[number]:
-                query.test(item)
+            visits.enter(number, self.lists[number], t_in, t_out)
             if query.t <= t_out:
                 return
             cell[axis] += step[axis]

@@ -1,0 +1,55 @@
+"""What both cores' divisions of space share: how many cells, and what is said when they are too many."""
+
+import math
+
+#: Part of a cell's edge (of a grid), or of the root's longest edge (of a tree), by which cells overlap, so that a walk off
+#: by rounding errors meets every primitive all the same.
+GRID_OVERLAP, TREE_OVERLAP = 2.0**-20, 2.0**-30
+
+
+def cells_along(size, n, rule, density, resolution):
+    """Cells of a grid along each axis.
+
+    Parameters
+    ----------
+    size : sequence of 3 float
+        Of the scene's box.
+    n : int
+        Number of primitives.
+    rule : {"woo", "regular", "heterogeneous"}
+        With M = density * n: M**(1/3) cells along the longest axis and cubic cells (Woo 1992), so fewer than M in a
+        scene that is no cube; M**(1/3) along every axis; or cubic cells, about M in all.
+    density : float
+        Cells per primitive.
+    resolution : int
+        Cells along the longest axis, whatever the density; 0 for none.
+
+    Returns
+    -------
+    list of 3 int
+    """
+    longest = max(size)
+    if not longest > 0.0:
+        return [1, 1, 1]
+    along = resolution or (density * n) ** (1 / 3)
+    if rule == "regular":
+        return [max(1, int(along)) if s > 0.0 else 1 for s in size]
+    shape = [s / longest for s in size]
+    if rule == "heterogeneous" and not resolution:
+        # Axes thinner than a cell get one, and the others share the rest.
+        wide = [s for s in shape if s > 0.0]
+        while wide:
+            along = (density * n / math.prod(wide)) ** (1 / len(wide))
+            if min(wide) * along >= 1.0 or len(wide) == 1:
+                break
+            wide.remove(min(wide))
+    return [max(1, int(s * along)) for s in shape]
+
+
+def too_many(name, cells, most, size, n, rule, density):
+    """The message that a grid of `cells` cells along the axes would not fit, with the resolution that would."""
+    fits = max(cells)
+    while fits > 1 and math.prod(cells_along(size, n, rule, density, fits)) > most:
+        fits = fits * 15 // 16
+    return (f"{name}: {' x '.join(map(str, cells))} cells are more than the {most} that fit into memory. "
+            f"Set resolution to {fits} or less.")
