@@ -39,24 +39,34 @@ def lit(table, surface, d, lights, transmitted, key):
         which = np.flatnonzero((cosine > 0.0) & (flat > 0.0) & (irradiance > 0.0))
         if not len(which):
             continue
-        to, towards, cosine, irradiance = to[:, which], towards[:, which], cosine[which], irradiance[which]
-        if light.shadows:
-            irradiance = irradiance * transmitted(surface, which, to, reach)
-        if surface.shading is not surface.normal:
-            irradiance = irradiance * terminator(surface, which, cosine, flat[which])
         m, base = surface.material[which], surface.base[:, which]
-        half = unit(towards - view[:, which])
+        half = unit(towards[:, which] - view[:, which])
         highlight = np.maximum(dot(surface.shading[:, which], half), 0.0) ** table.shininess[m]
-        reflected = (table.diffuse[m] * cosine) * base + highlight * (table.specular[m] + table.specular_base[m] * base)
-        total[:, which] += reflected * (irradiance / math.pi) * np.array(light.colour, float)[:, None]
+        reflected = (table.diffuse[m] * cosine[which]) * base + highlight * (table.specular[m] + table.specular_base[m] * base)
+        # Mirrors and glass reflect little but their narrow highlights: no shadow ray where there is nothing to shade.
+        some = np.flatnonzero(reflected.any(axis=0))
+        which, reflected = which[some], reflected[:, some]
+        if not len(which):
+            continue
+        arrives = irradiance[which] / math.pi
+        if surface.shading is not surface.normal:
+            arrives = arrives * terminator(cosine[which], flat[which], dot(surface.normal[:, which], surface.shading[:, which]))
+        if light.shadows:
+            arrives = arrives * transmitted(surface, which, to[:, which], reach)
+        total[:, which] += reflected * arrives * np.array(light.colour, float)[:, None]
     return total
 
 
-def terminator(surface, which, cosine, flat):
+def terminator(cosine, flat, between):
     """Fade light to nothing where it comes to graze the flat triangle under a smooth normal.
 
     Without it a light that the smooth normal still sees would be cut off at the triangle's edge (Chiang, Li and
     Burley, Taming the Shadow Terminator, 2019).
+
+    Parameters
+    ----------
+    cosine, flat, between : ndarray, shape (n,)
+        Cosines between smooth normal and light, flat normal and light, flat and smooth normal.
     """
-    g = np.minimum(flat / (cosine * dot(surface.normal[:, which], surface.shading[:, which])), 1.0)
+    g = np.minimum(flat / (cosine * between), 1.0)
     return -g * g * g + g * g + g

@@ -36,16 +36,20 @@ def lit(surface, d, lights, transmitted, key):
         flat = dot(surface.normal, towards)
         if not (cosine > 0.0 and flat > 0.0 and irradiance > 0.0):
             continue
-        arrives = times(irradiance / math.pi, tuple(map(float, light.colour)))
-        if light.shadows:
-            arrives = mul(arrives, transmitted(surface, to, reach))
-        if normal is not surface.normal:
-            arrives = times(terminator(cosine, flat, dot(surface.normal, normal)), arrives)
         half = unit(minus(towards, view))
         highlight = max(dot(normal, half), 0.0) ** material.shininess
         specular = tuple(material.specular + material.specular_base * c for c in base)
         reflected = add(times(material.diffuse * cosine, base), times(highlight, specular))
-        total = add(total, mul(reflected, arrives))
+        # Mirrors and glass reflect little but their narrow highlights: no shadow ray where there is nothing to shade.
+        if not any(reflected):
+            continue
+        arrives = irradiance / math.pi
+        if normal is not surface.normal:
+            arrives *= terminator(cosine, flat, dot(surface.normal, normal))
+        colour = times(arrives, tuple(map(float, light.colour)))
+        if light.shadows:
+            colour = mul(colour, transmitted(surface, to, reach))
+        total = add(total, mul(reflected, colour))
     return total
 
 
