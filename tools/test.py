@@ -42,7 +42,8 @@ def blender():
     command = _blender()
     site = {} if "blender-chroot" in command[0] else {"TEST_SITE": os.environ.get("TEST_SITE") or _test_site(command)}
     script = ["-b", "--factory-startup", "--python-exit-code", "1", "--python", "tests/run_in_blender.py"]
-    return [*command, *script, "--", "-q", "-rs", "tests/addon", "tests/core"], site
+    # The core's slow tests do not depend on who runs Python, and have run in the part "core".
+    return [*command, *script, "--", "-q", "-rs", "-m", "not slow", "tests/addon", "tests/core"], site
 
 
 def gui():
@@ -93,11 +94,15 @@ def run(name):
         )  # fmt: skip
         signal.signal(signal.SIGALRM, lambda *_: os.killpg(process.pid, signal.SIGKILL))
         signal.alarm(LONGEST)
-        for line in process.stdout:
-            print(line, end="", flush=True)
-            lines.append(line)
-        code = process.wait()
-        signal.alarm(0)
+        try:
+            for line in process.stdout:
+                print(line, end="", flush=True)
+                lines.append(line)
+            code = process.wait()
+        finally:  # interrupted: nothing goes on behind our back
+            signal.alarm(0)
+            if process.poll() is None:
+                os.killpg(process.pid, signal.SIGKILL)
     figures = _figures(lines)
     seconds = time.monotonic() - start
     if code == -signal.SIGKILL and seconds >= LONGEST:
@@ -114,6 +119,7 @@ def _figures(lines):
 
 
 def main(names):
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))
     unknown = set(names) - set(PARTS)
     if unknown:
         sys.exit(f"unknown part: {', '.join(unknown)}; there are {', '.join(PARTS)}")
