@@ -59,6 +59,38 @@ def read_nff(path):
     return Reader(path.name, data.decode("utf-8", "replace")).scene()
 
 
+def scene_of(name, shapes, fills, lights, background, camera, notices=()):
+    """The scene that NFF's numbers describe.
+
+    Parameters
+    ----------
+    name : str
+    shapes : list of Solid
+    fills : sequence of 8 numbers each
+        r, g, b, Kd, Ks, Shine, T, ior: the materials in the order of the solids' slots.
+    lights : list of (position, colour)
+    background : triple
+    camera : Camera or None
+    notices : sequence of Notice
+
+    Returns
+    -------
+    Scene
+    """
+    share = math.pi / math.sqrt(max(len(lights), 1))
+    lights = [Light(f"Light {k + 1}", "point", tuple(share * c for c in colour), position=tuple(position), falloff=False)
+              for k, (position, colour) in enumerate(lights)]
+    materials = tuple(_material(k, *fill) for k, fill in enumerate(fills)) or (Material("Fill"),)
+    objects = [Object(name, Shapes(shapes, name), materials=materials)] if shapes else []
+    return Scene(objects, lights, camera, World(colour=tuple(background), ambient=(0.0, 0.0, 0.0)), name=name, notices=list(notices))
+
+
+def _material(number, r, g, b, diffuse, specular, shininess, transmission, ior):
+    """The material of a fill line."""
+    return Material(f"Fill {number + 1}", base=(r, g, b), ambient=diffuse, diffuse=diffuse, specular=specular, shininess=shininess,
+                    mirror=specular, transmission=transmission, ior=ior if ior > 0.0 else 1.0)
+
+
 class _Unreadable(Exception):
     """A line does not say what its keyword needs."""
 
@@ -79,8 +111,7 @@ class Reader:
     def __init__(self, name, text):
         self.name, self.lines, self.at = name, text.splitlines(), 0
         self.view, self.lights, self.solids, self.notices, self.unnamed = {}, [], [], [], 0
-        self.background = (0.0, 0.0, 0.0)
-        self.materials, self.slots, self.slot = {}, {}, 0
+        self.background, self.fills, self.slot = (0.0, 0.0, 0.0), {}, 0
         self.smooth_left_out = 0
         self.readers = {"b": self._background, "l": self._light, "f": self._fill, "s": self._sphere, "c": self._cone,
                         "p": self._polygon, "pp": self._patch, "v": lambda words: None}
@@ -118,13 +149,7 @@ class Reader:
         if self.smooth_left_out:
             self.notices.append(Notice(self.name, f"{self.smooth_left_out} patches (pp) have more than three corners; their normals are "
                                        "not used, they look flat. Divide them into triangles."))
-        share = math.pi / math.sqrt(max(len(self.lights), 1))
-        lights = [Light(f"Light {k + 1}", "point", tuple(share * c for c in colour), position=position, falloff=False)
-                  for k, (position, colour) in enumerate(self.lights)]
-        materials = tuple(self.materials.values()) or (Material("Fill"),)
-        objects = [Object(self.name, Shapes(self.solids, self.name), materials=materials)] if self.solids else []
-        return Scene(objects, lights, self._camera(), World(colour=self.background, ambient=(0.0, 0.0, 0.0)), name=self.name,
-                     notices=self.notices)
+        return scene_of(self.name, self.solids, self.fills, self.lights, self.background, self._camera(), self.notices)
 
     def _camera(self):
         """The camera, or None when the view is incomplete."""
@@ -175,13 +200,7 @@ class Reader:
         self.lights.append((numbers[:3], numbers[3:] or (1.0, 1.0, 1.0)))
 
     def _fill(self, words):
-        numbers = self._numbers(words, 8)
-        if numbers not in self.materials:
-            r, g, b, diffuse, specular, shininess, transmission, ior = numbers
-            self.materials[numbers] = Material(f"Fill {len(self.materials) + 1}", base=(r, g, b), ambient=diffuse, diffuse=diffuse,
-                                               specular=specular, shininess=shininess, mirror=specular, transmission=transmission,
-                                               ior=ior if ior > 0.0 else 1.0)
-        self.slot = self.slots.setdefault(numbers, len(self.slots))
+        self.slot = self.fills.setdefault(self._numbers(words, 8), len(self.fills))
 
     def _sphere(self, words):
         x, y, z, radius = self._numbers(words, 4)
