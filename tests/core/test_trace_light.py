@@ -49,6 +49,7 @@ LIGHTS = {
     # name: light, cosine at the floor's point (0, 0, 0) and irradiance facing it
     "point": (Light("l", "point", (3, 2, 1), position=(3, 0, 4)), 4 / 5, 1 / 25),
     "point without falloff": (Light("l", "point", (3, 2, 1), position=(3, 0, 4), falloff=False), 4 / 5, 1.0),
+    "point with a radius": (Light("l", "point", (3, 2, 1), position=(3, 0, 4), radius=1.0), 4 / 5, 1 / 26),      # as Cycles has it
     "sun": (Light("l", "sun", (3, 2, 1), direction=(-0.6, 0, -0.8)), 0.8, 1.0),
     "spot, on the axis": (Light("l", "spot", (3, 2, 1), position=(3, 0, 4), direction=(-0.6, 0, -0.8), spot_angle=0.5), 0.8, 1 / 25),
     "spot, outside": (Light("l", "spot", (3, 2, 1), position=(3, 0, 4), direction=(0, 0, -1), spot_angle=1.0), 0.8, 0.0),
@@ -70,6 +71,16 @@ def test_diffuse_light_of_each_kind(core, name):
     got = seen(core, [floor(LAMBERT)], eye((-1, 2, 5), (0, 0, 0)), [light])
     want = np.array(LAMBERT.base) * cosine * irradiance * np.array(light.colour) / math.pi
     np.testing.assert_allclose(got, want, rtol=1e-6, atol=1e-12)
+
+
+@CORES
+@pytest.mark.parametrize("kind", ["point", "spot", "area", "sun"])
+def test_samples_of_a_light_have_the_mean_of_its_centre(core, kind):
+    """Small lights: what many samples see is what one sample sees of the centre."""
+    lamp = Light("l", kind, (3, 2, 1), position=(0, 0, 4), radius=0.3, axes=((0.2, 0, 0), (0, 0.2, 0)))
+    centre, mean = (seen(core, [floor(LAMBERT)], eye((3, 0, 4), (0, 0, 0)), [lamp], samples=n) for n in (1, 400))
+    np.testing.assert_allclose(mean, centre, rtol=0.02 if kind != "sun" else 0.05)
+    assert (mean != centre).all()
 
 
 @CORES

@@ -39,15 +39,21 @@ def arriving(light, point, u=None, v=None):
     to = np.array(light.position, float)[:, None] - point
     if light.kind == "area":
         return _from_area(light, axis, to, u, v)
-    squared = dot(to, to)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        irradiance = 1.0 / squared if light.falloff else np.ones(len(squared))
-        if light.kind == "spot":
-            irradiance = irradiance * cone(light, -dot(to, axis) / np.sqrt(squared))
-    irradiance = np.where(squared > 0.0, irradiance, 0.0)
-    if u is not None and light.radius > 0.0:
-        # The luminous sphere, as the disc of it that faces the point; intensity and distance are its centre's.
+    squared, axial = dot(to, to), to
+    soft = u is not None and light.radius > 0.0
+    if soft:
+        # The luminous sphere counts as its disc that faces the point: Blender's soft falloff.
         to = facing_disc(to, light.radius, u, v)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        if not light.falloff:
+            irradiance = np.ones(len(squared))
+        elif soft:
+            irradiance = np.sqrt(squared) / dot(to, to) ** 1.5
+        else:
+            irradiance = 1.0 / (squared + light.radius * light.radius)        # the mean of the above over the disc
+        if light.kind == "spot":
+            irradiance = irradiance * cone(light, -dot(axial, axis) / np.sqrt(squared))
+    irradiance = np.where(squared > 0.0, irradiance, 0.0)
     return to, 1.0, unit(to), irradiance
 
 

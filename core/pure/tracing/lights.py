@@ -39,12 +39,18 @@ def arriving(light, point, u=None, v=None):
     squared = dot(to, to)
     if squared == 0.0:
         return to, 1.0, to, 0.0
-    irradiance = 1.0 / squared if light.falloff else 1.0
-    if light.kind == "spot":
-        irradiance *= cone(light, -dot(to, axis) / math.sqrt(squared))
-    if u is not None and light.radius > 0.0:
-        # The luminous sphere, as the disc of it that faces the point; intensity and distance are its centre's.
+    share = cone(light, -dot(to, axis) / math.sqrt(squared)) if light.kind == "spot" else 1.0
+    soft = u is not None and light.radius > 0.0
+    if soft:
+        # The luminous sphere counts as its disc that faces the point: Blender's soft falloff.
         to = facing_disc(to, light.radius, u, v)
+    if not light.falloff:
+        irradiance = 1.0
+    elif soft:
+        irradiance = math.sqrt(squared) / dot(to, to) ** 1.5
+    else:
+        irradiance = 1.0 / (squared + light.radius * light.radius)        # the mean of the above over the disc
+    irradiance *= share
     return to, 1.0, unit(to), irradiance
 
 
