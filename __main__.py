@@ -1,5 +1,6 @@
 """``python -m rayscope VERB FILE ...``"""
 
+import os
 import sys
 
 from .core.command import main as command
@@ -19,6 +20,10 @@ def open_in_blender(path, size):
 
 def main():
     """The command; its exit code."""
+    # stdout belongs to the results: what Blender itself prints there, from C, goes to stderr.
+    sys.stdout.flush()
+    sys.stdout = os.fdopen(os.dup(1), "w", encoding="utf-8", closefd=False)
+    os.dup2(2, 1)
     return command(sys.argv[1:], open_in_blender=open_in_blender)
 
 

@@ -1,8 +1,5 @@
 """Opens files in the `bpy` module (or a background Blender) for the command."""
 
-import contextlib
-import os
-import sys
 from pathlib import Path
 
 import bpy
@@ -44,42 +41,27 @@ def open_file(path, size=None):
     """
     path = Path(path)
     is_blend = path.suffix.lower() == ".blend"
-    with _stdout_to_stderr():
-        try:
-            if is_blend:
-                bpy.ops.wm.open_mainfile(filepath=str(path.resolve()), load_ui=False, use_scripts=False)
-            else:
-                bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
-                done = IMPORTERS[path.suffix.lower()](str(path.resolve()))
-                if "FINISHED" not in done or not bpy.context.scene.objects:
-                    raise SceneError(f"{path}: Blender found nothing in it that it can read.")
-                bpy.context.scene.camera = next((o for o in bpy.context.scene.objects if o.type == "CAMERA"), None)
-        except RuntimeError as error:
-            # An operator's report: "Error: ..." lines.
-            text = " ".join(line.removeprefix("Error: ").strip() for line in str(error).splitlines() if line.strip())
-            raise SceneError(f"{path}: Blender cannot read it: {text}") from None
-        if is_blend or bpy.context.scene.camera:
-            return open_scene(size)
-        # That a mesh file holds no camera is nobody's mistake: the caller adds one, and nothing is said here.
-        scene = read_scene(bpy.context.evaluated_depsgraph_get(), camera=Camera(np.eye(4)))
-        scene.camera, scene.name = None, path.name
-        return scene
+    try:
+        if is_blend:
+            bpy.ops.wm.open_mainfile(filepath=str(path.resolve()), load_ui=False, use_scripts=False)
+        else:
+            bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
+            done = IMPORTERS[path.suffix.lower()](str(path.resolve()))
+            if "FINISHED" not in done or not bpy.context.scene.objects:
+                raise SceneError(f"{path}: Blender found nothing in it that it can read.")
+            bpy.context.scene.camera = next((o for o in bpy.context.scene.objects if o.type == "CAMERA"), None)
+    except RuntimeError as error:
+        # An operator's report: "Error: ..." lines.
+        text = " ".join(line.removeprefix("Error: ").strip() for line in str(error).splitlines() if line.strip())
+        raise SceneError(f"{path}: Blender cannot read it: {text}") from None
+    if is_blend or bpy.context.scene.camera:
+        return open_scene(size)
+    # That a mesh file holds no camera is nobody's mistake: the caller adds one, and nothing is said here.
+    scene = read_scene(bpy.context.evaluated_depsgraph_get(), camera=Camera(np.eye(4)))
+    scene.camera, scene.name = None, path.name
+    return scene
 
 
 def open_scene(size=None):
     """The scene that is open, as :func:`open_file` returns it."""
     return read_scene(bpy.context.evaluated_depsgraph_get(), size=size)
-
-
-@contextlib.contextmanager
-def _stdout_to_stderr():
-    """What Blender prints goes to stderr: stdout belongs to the command's results."""
-    sys.stdout.flush()
-    kept = os.dup(1)
-    os.dup2(2, 1)
-    try:
-        yield
-    finally:
-        sys.stdout.flush()
-        os.dup2(kept, 1)
-        os.close(kept)

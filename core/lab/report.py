@@ -109,7 +109,7 @@ def table(rows, columns):
     """
     cells = [list(columns)] + [[text(row.get(c), c) for c in columns] for row in rows]
     widths = [max(len(line[i]) for line in cells) for i in range(len(columns))]
-    left = [all(isinstance(row.get(c), (str, type(None))) for row in rows) for c in columns]
+    left = [any(isinstance(row.get(c), str) for row in rows) for c in columns]
     return "\n".join("  ".join(cell.ljust(w) if l else cell.rjust(w) for cell, w, l in zip(line, widths, left)).rstrip()
                      for line in cells)
 

@@ -44,7 +44,8 @@ def read_file(path, open_in_blender=None, size=None):
     if not path.is_file():
         raise SceneError(f"{path}: there is no such file.")
     if name.endswith(OWN):
-        return _read_nff(path)
+        from .nff import read_nff
+        return read_nff(path)
     if open_in_blender is None:
         raise MissingPackageError(f"{path}: {path.suffix} files are read by Blender. Get it with: pip install bpy "
                                   "(its Python version must fit), or run: blender -b FILE --command rayscope VERB.")
@@ -52,14 +53,6 @@ def read_file(path, open_in_blender=None, size=None):
     if name.endswith(MESHES):
         add_view(scene, size)
     return scene
-
-
-def _read_nff(path):
-    try:
-        from .nff import read_nff
-    except ModuleNotFoundError:
-        raise SceneError(f"{path}: this version of Rayscope does not read NFF files.") from None
-    return read_nff(path)
 
 
 def add_view(scene, size=None):

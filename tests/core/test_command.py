@@ -1,0 +1,310 @@
+"""The command without Blender: what it prints, its exit codes, one line for every error."""
+import json
+import os
+import re
+import signal
+import subprocess
+import sys
+import threading
+
+import numpy as np
+import pytest
+from rayscope.core import Camera, Light, Mesh, Object, Scene, SceneError, rendering, techniques
+from rayscope.core import command
+from rayscope.core.command import DONE, FAILED, VERBS, WRONG_CALL, main
+from rayscope.core.fast.hierarchies.bvh import BVH
+from rayscope.core.lab import bench
+
+
+def scene(size=None, n=200, **more):
+    rng = np.random.default_rng(1)
+    corners = rng.uniform(-1, 1, (n, 1, 3)) + rng.normal(0, 0.2, (n, 3, 3))
+    more.setdefault("camera", Camera.look_at((0, -5, 1), (0, 0, 0), aspect=size[0] / size[1] if size else 2.0))
+    return Scene([Object("soup", Mesh(corners.reshape(-1, 3), np.arange(3 * n).reshape(-1, 3)))],
+                 [Light("Lamp", "point", (90, 90, 90), position=(2, -2, 4))], name="soup", **more)
+
+
+@pytest.fixture
+def run(capfd):
+    """Runs the command on the open scene; gives exit code, stdout, lines of stderr."""
+    def call(*argv, read=scene, **more):
+        code = main([str(a) for a in argv], read, **more)
+        out, err = capfd.readouterr()
+        return code, out, err.splitlines()
+    return call
+
+
+# --- list -------------------------------------------------------------------------------------------------------------
+
+def test_list(run):
+    code, out, err = run("list")
+    assert code == DONE and not err
+    for t in techniques():
+        assert re.search(rf"^{t.name}: ", out, re.M)
+        for p in t.parameters:
+            assert f"    {p.name} = " in out
+
+
+def test_list_json(run):
+    code, out, err = run("list", "--json")
+    rows = {t["name"]: t for t in json.loads(out)["techniques"]}
+    assert code == DONE and list(rows) == [t.name for t in techniques()]
+    builder = next(p for p in rows["bvh"]["parameters"] if p["name"] == "builder")
+    assert builder["default"]["pure"] in builder["choices"]["pure"] and builder["default"]["fast"] in builder["choices"]["fast"]
+
+
+# --- trace ------------------------------------------------------------------------------------------------------------
+
+def test_trace(run, tmp_path):
+    image, figures = tmp_path / "a.png", tmp_path / "a.json"
+    code, out, err = run("trace", "--size", "40x30", "--image", image, "--figures", figures, "--count", "--set", "builder=sah")
+    assert code == DONE, err
+    head = image.read_bytes()[:24]
+    assert head[:4] == b"\x89PNG" and head[16:] == (40).to_bytes(4, "big") + (30).to_bytes(4, "big")
+    record = json.loads(figures.read_text())
+    assert record["parameters"]["size"] == [40, 30] and record["parameters"]["parameters"] == {"builder": "sah"}
+    assert {"rayscope", "machine", "scene", "seed"} <= record.keys() and record["scene"]["primitives"] == 200
+    assert record["figures"]["primary"]["rays"] == 1200 and record["figures"]["primary"]["N_IT"] > 0
+    assert str(image) in out and "N_IT" in out and re.search(r"^primary +bvh +1200", out, re.M)
+
+
+def test_trace_json_alone_on_stdout(run):
+    code, out, err = run("trace", "--size", "8x8", "--json")
+    assert code == DONE and json.loads(out)["figures"]["primary"]["rays"] == 64
+
+
+def test_trace_each_kind_of_ray_its_own_technique(run):
+    code, out, err = run("trace", "--size", "16x16", "--technique", "brute", "--shadow", "bvh:builder=sah", "--json")
+    figures = json.loads(out)["figures"]
+    assert (figures["primary"]["technique"], figures["shadow"]["technique"]) == ("brute", "bvh")
+
+
+def test_trace_pure(run):
+    code, out, err = run("trace", "--size", "8x6", "--core", "pure", "--technique", "brute", "--json")
+    assert code == DONE and json.loads(out)["parameters"]["core"] == "pure"
+
+
+def test_without_a_size_the_cameras_proportions_hold(run):
+    sizes = []
+
+    def read(size):
+        sizes.append(size)
+        return scene(size)
+
+    code, out, err = run("trace", "--json", read=read)
+    assert sizes == [None] and json.loads(out)["parameters"]["size"] == [640, 320]
+    run("trace", "--size", "12x10", read=read)
+    assert sizes[1] == (12, 10)
+
+
+def test_notices_go_to_stderr(run):
+    def read(size):
+        found = scene(size)
+        found.objects[0].geometry.vertices[0] = np.nan
+        return Scene([Object("broken", Mesh(found.objects[0].geometry.vertices, found.objects[0].geometry.triangles))], found.lights, found.camera)
+
+    code, out, err = run("trace", "--size", "8x8", "--json", read=read)
+    assert code == DONE and any(line.startswith("broken: ") and "NaN" in line for line in err)
+    assert any("NaN" in n for n in json.loads(out)["scene"]["notices"])
+
+
+def test_ctrl_c_keeps_what_is_done(run, tmp_path, monkeypatch):
+    monkeypatch.setattr(rendering, "INTERVAL", 0.0)
+    before = signal.getsignal(signal.SIGINT)
+    threading.Timer(0.5, os.kill, (os.getpid(), signal.SIGINT)).start()
+    code, out, err = run("trace", "--size", "256x256", "--samples", "100000", "--image", tmp_path / "a.png", "--json")
+    assert code == FAILED and "stopped" in err[-1] and json.loads(out)["stopped"] is True
+    assert (tmp_path / "a.png").exists() and signal.getsignal(signal.SIGINT) is before
+
+
+# --- compare ----------------------------------------------------------------------------------------------------------
+
+def test_compare(run, tmp_path):
+    code, out, err = run("compare", "--techniques", "brute,bvh:builder=sah", "--core", "both", "--rays", 40, "--out", tmp_path / "o")
+    assert code == DONE, err
+    assert re.search(r"^bvh:builder=sah +pure ", out, re.M) and re.search(r"^brute +fast ", out, re.M)
+    record = json.loads((tmp_path / "o" / "compare.json").read_text())
+    assert record["seed"] == 0 and len(record["rows"]) == 4 and (tmp_path / "o" / "table.csv").exists()
+
+
+def test_compare_fails_where_a_technique_is_wrong(run, monkeypatch):
+    monkeypatch.setattr(BVH, "traverse", lambda self, rays, query: None)
+    code, out, err = run("compare", "--techniques", "bvh,brute", "--rays", 100, "--json")
+    record = json.loads(out)
+    # Bounces start where the bvh hits: there are none.
+    assert code == FAILED and record["failed"] and record["rows"][0]["differ"] > 0 and record["rows"][1]["differ"] == 0
+    assert "other hits than brute force" in err[-1]
+
+
+# --- bench ------------------------------------------------------------------------------------------------------------
+
+def test_bench(run):
+    code, out, err = run("bench", "--subdivisions", 0, "--size", "12x12", "--repeats", 1, "--json")
+    assert code == DONE, err
+    record = json.loads(out)
+    rows = {r["technique"]: r for r in record["rows"]}
+    assert {"bvh:builder=ploc", "bvh:builder=sah", "grid", "octree"} <= rows.keys()
+    assert record["rays"] == {"primary": 144, "secondary": 144, "shadow": 144} and record["bar"] is None
+    assert record["memory"]["trace_peak"] >= record["memory"]["structure"] > 0
+    for peer in {"mathutils", "embree"} & rows.keys():
+        assert rows["grid"][f"x_{peer}_primary"] == pytest.approx(rows[peer]["us_primary"] / rows["grid"]["us_primary"])
+    assert 20_000 < record["scene"]["primitives"] < 22_000
+    assert bench.text(record).count("\n") > 8
+
+
+def test_growth_fits_exponents(monkeypatch):
+    result = bench.growth(levels=(0, 1))
+    assert [r["N"] for r in result["rows"] if r["technique"] == "bvh"][1] > 3900 and len(result["exponents"]) == 3
+    two = [r for r in result["rows"] if r["technique"] == "grid"]
+    expected = np.log(two[1]["T_B"] / two[0]["T_B"]) / np.log(two[1]["N"] / two[0]["N"])
+    assert next(e for e in result["exponents"] if e["technique"] == "grid")["e_build"] == pytest.approx(expected)
+
+
+def test_the_bar_of_the_bench():
+    row = {"technique": "bvh", "x_mathutils_primary": 2.5, "x_mathutils_secondary": 1.9}
+    assert not bench._bar(row, {"trace_peak": 1e6})["met"]
+    row["x_mathutils_secondary"] = 2.0
+    assert bench._bar(row, {"trace_peak": 1e6})["met"] and not bench._bar(row, {"trace_peak": 3e8})["met"]
+
+
+# --- wrong calls ------------------------------------------------------------------------------------------------------
+
+WRONG = [
+    (["trcae"], "trcae"),
+    ([], "VERB"),
+    (["trace", "extra"], "extra"),
+    (["trace", "--technique", "bhv"], "did you mean 'bvh'"),
+    (["trace", "--technique", "bvh:depht=3"], "no parameter 'depht'"),
+    (["trace", "--set", "builder"], "NAME=VALUE"),
+    (["trace", "--set", "leaf_size=many"], "a whole number"),
+    (["trace", "--set", "leaf_size=0"], "between 1 and"),
+    (["trace", "--technique", "embree", "--core", "pure"], "no core 'pure'"),
+    (["trace", "--shadow", "nothing"], "no technique 'nothing'"),
+    (["trace", "--core", "gpu"], "gpu"),
+    (["trace", "--size", "0x0"], "0 x 0"),
+    (["trace", "--size", "100000x100000"], "100000 x 100000"),
+    (["trace", "--size=-4x4"], "-4 x 4"),
+    (["trace", "--size", "640"], "640x480"),
+    (["trace", "--size", "9x9", "--samples", "0"], "samples"),
+    (["trace", "--size", "9x9", "--depth", "-1"], "depth"),
+    (["trace", "--size", "9x9", "--samples", "few"], "few"),
+    (["trace", "--image", "/no/such/folder/a.png"], "/no/such/folder"),
+    (["trace", "--image", "/"], "folder"),
+    (["trace", "--size", "9x9", "--image", "/dev/full/a.png"], "/dev/full"),
+    (["trace", "--size", "9x9", "--figures", "/proc/a.json"], "/proc/a.json"),
+    (["compare", "--techniques", "bvh,kd-treee", "--rays", "9"], "kd-treee"),
+    (["compare", "--techniques", "", "--rays", "9"], "no technique ''"),
+    (["compare", "--rays", "0"], "0 does not lie"),
+    (["compare", "--rays", "9", "--out", "/proc/out"], "/proc/out"),
+    (["compare", "--seed", "-1"], "-1"),
+]
+
+
+@pytest.mark.parametrize("argv, names", WRONG, ids=lambda v: " ".join(v) if isinstance(v, list) else "")
+def test_a_wrong_call_is_one_line_that_names_it(run, argv, names):
+    code, out, err = run(*argv)
+    assert code == WRONG_CALL and not out
+    assert names in err[-1] and err[-1].startswith("rayscope")
+    assert len([line for line in err if line.startswith(("rayscope", "Traceback", "  "))]) == 1
+
+
+def test_a_scene_without_what_is_needed(run):
+    code, out, err = run("trace", "--size", "9x9", read=lambda size: Scene(name="bare"))
+    assert code == WRONG_CALL and "bare: there is no camera" in err[-1]
+    code, out, err = run("compare", read=lambda size: Scene(name="bare"))
+    assert code == WRONG_CALL and "bare: there is nothing to trace" in err[-1]
+    # No object at all is a picture of the surroundings.
+    assert run("trace", "--size", "9x9", read=lambda size: Scene(camera=scene().camera))[0] == DONE
+
+
+def test_a_mistake_of_ours_is_one_line_too(run):
+    code, out, err = run("trace", "--size", "9x9", read=lambda size: 1 / 0)
+    assert code == FAILED and len(err) == 1 and "internal error" in err[0] and "ZeroDivisionError" in err[0] and "test_command.py" in err[0]
+
+
+@pytest.mark.parametrize("error", [MemoryError(), KeyboardInterrupt()])
+def test_out_of_memory_and_stopped(run, error):
+    def read(size):
+        raise error
+    code, out, err = run("trace", read=read)
+    assert code == FAILED and len(err) == 1
+
+
+# --- files ------------------------------------------------------------------------------------------------------------
+
+@pytest.fixture
+def run_file(capfd):
+    def call(*argv, **more):
+        code = main([str(a) for a in argv], **more)
+        out, err = capfd.readouterr()
+        return code, out, err.splitlines()
+    return call
+
+
+def test_files(run_file, tmp_path):
+    for name, said in (("none.blend", "no such file"), ("a.jpg", "Known endings: .nff, .nff.gz, .blend, .obj"), ("folder.obj", "no such file")):
+        if name.startswith("folder"):
+            (tmp_path / name).mkdir()
+        code, out, err = run_file("trace", tmp_path / name)
+        assert code == WRONG_CALL and name in err[0] and said in err[0] and len(err) == 1
+    code, out, err = run_file("compare")
+    assert code == WRONG_CALL and "FILE" in err[0]
+
+
+def test_what_only_blender_reads(run_file, tmp_path):
+    path = tmp_path / "a.ply"
+    path.write_text("ply")
+    code, out, err = run_file("trace", path)
+    assert code == FAILED and "pip install bpy" in err[0]
+    code, out, err = run_file("trace", path, "--size", "9x9", open_in_blender=lambda p, size: scene(size, camera=None))
+    assert code == DONE and any("no camera" in line for line in err)
+
+    def refuse(path, size):
+        raise SceneError(f"{path}: not a mesh")
+    code, out, err = run_file("trace", path, open_in_blender=refuse)
+    assert code == WRONG_CALL and "not a mesh" in err[0]
+
+
+@pytest.mark.parametrize("size", [(300, 200), (200, 300), None])
+def test_the_view_that_is_added_sees_everything(size):
+    from rayscope.core.scene.files import add_view
+    found = scene(camera=None)
+    found.lights.clear()
+    add_view(found, size)
+    lo, hi = found.bounds()
+    corners = np.array([[(lo, hi)[i >> a & 1][a] for a in range(3)] for i in range(8)])
+    position, right, up, forward = found.camera.frame()
+    seen = corners - position
+    depth = seen @ forward
+    left, right_, bottom, top = found.camera.window
+    x, y = (seen @ right) / depth, (seen @ up) / depth
+    assert (depth > 0).all() and left < x.min() and x.max() < right_ and bottom < y.min() and y.max() < top
+    assert max((x.max() - x.min()) / (right_ - left), (y.max() - y.min()) / (top - bottom)) > 0.4, "and not from too far away"
+    assert [n.text.split(";")[0] for n in found.notices] == ["the file has no camera", "the file has no light"]
+
+
+# --- as a process -----------------------------------------------------------------------------------------------------
+
+def process(*argv, **more):
+    return subprocess.run([sys.executable, "-m", "rayscope", *argv], capture_output=True, text=True, timeout=120, **more)
+
+
+def test_as_a_process(tmp_path):
+    done = process("list", "--json")
+    assert done.returncode == DONE and not done.stderr and json.loads(done.stdout)["verb"] == "list"
+    wrong = process("trace", str(tmp_path / "none.blend"))
+    assert wrong.returncode == WRONG_CALL and not wrong.stdout and len(wrong.stderr.splitlines()) == 1
+    assert process("--version").stdout.startswith("Rayscope ") and process("trace", "--help").returncode == DONE
+
+
+def test_a_reader_that_leaves_early_is_no_error():
+    with subprocess.Popen([sys.executable, "-m", "rayscope", "list"], stdout=subprocess.PIPE, stderr=subprocess.PIPE) as run:
+        run.stdout.close()
+        assert run.stderr.read() == b"" and run.wait(60) == FAILED
+
+
+def test_every_verb_has_help_and_json():
+    parser = command.parser(with_file=True)
+    for name, verb in VERBS.items():
+        call = parser.parse_args([name, *(["x.blend"] if verb.scene else []), "--json"])
+        assert call.json and verb.help and verb.run.__doc__
