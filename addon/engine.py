@@ -1,5 +1,7 @@
 """The render engine: F12, animations, `blender -b file.blend -E RAYSCOPE -f 1`, and the viewport's rendered mode."""
 
+import weakref
+
 import bpy
 import numpy as np
 
@@ -101,18 +103,17 @@ class RayscopeRenderEngine(bpy.types.RenderEngine):
                 task.keep()
 
     def view_update(self, context, depsgraph):
-        if self._preview is None:
-            self._preview = preview.Preview()
-        self._preview.scene_changed()
+        self._shown().scene_changed()
 
     def view_draw(self, context, depsgraph):
+        self._shown().draw(self, context, depsgraph)
+
+    def _shown(self):
+        """What this viewport shows."""
         if self._preview is None:
             self._preview = preview.Preview()
-        self._preview.draw(self, context, depsgraph)
-
-    def __del__(self):
-        if self._preview is not None:
-            self._preview.stop()
+            weakref.finalize(self, self._preview.stop)  # in __del__, Blender has already taken the attributes away
+        return self._preview
 
 
 def border_of(scene):
@@ -136,14 +137,15 @@ def _flat(array):
 
 #: Panels of other engines that show what we use, by class name; those with BLENDER_RENDER in their list come besides.
 MORE_PANELS = {"EEVEE_MATERIAL_PT_context_material", "EEVEE_MATERIAL_PT_surface", "MATERIAL_PT_preview", "DATA_PT_EEVEE_light", "EEVEE_WORLD_PT_surface"}
-#: DATA_PT_light would be a second Light panel; filters and their passes are not ours.
-NOT_OURS = {"VIEWLAYER_PT_filter", "VIEWLAYER_PT_layer_passes", "DATA_PT_light"}
+#: DATA_PT_light would be a second Light panel. Its set of engines is shared by its copy in the node editor, hence the look at identities below.
+NOT_OURS = {"DATA_PT_light"}
 
 
 def _panels():
-    for panel in bpy.types.Panel.__subclasses__():
-        engines = getattr(panel, "COMPAT_ENGINES", None)
-        if engines is not None and panel.__name__ not in NOT_OURS and ("BLENDER_RENDER" in engines or panel.__name__ in MORE_PANELS):
+    panels = {panel.__name__: panel.COMPAT_ENGINES for panel in bpy.types.Panel.__subclasses__() if getattr(panel, "COMPAT_ENGINES", None)}
+    not_ours = {id(panels.get(name)) for name in NOT_OURS}
+    for name, engines in panels.items():
+        if id(engines) not in not_ours and ("BLENDER_RENDER" in engines or name in MORE_PANELS):
             yield engines
 
 

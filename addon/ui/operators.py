@@ -158,7 +158,8 @@ class RAYSCOPE_OT_build(Work, bpy.types.Operator):
 class RAYSCOPE_OT_trace(Work, bpy.types.Operator):
     bl_idname = "rayscope.trace"
     bl_label = "Trace Image"
-    bl_description = "Trace the scene from its camera into the image \"Rayscope\", shown in an Image Editor if one is open"
+    bl_description = ("Trace the scene from its camera, with the modifiers as the viewport has them, into the image \"Rayscope\", "
+                      "shown in an Image Editor if one is open")
 
     title = "Tracing"
 

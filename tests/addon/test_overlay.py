@@ -114,12 +114,13 @@ def with_gpu(function):
 
     bpy.utils.register_class(Engine)
     try:
+        bpy.ops.wm.read_homefile(use_factory_startup=True)  # a scene with a camera, or Blender refuses to render
         scene = bpy.context.scene
-        engine, scene.render.engine = scene.render.engine, "RAYSCOPE_TEST"
+        scene.render.engine = "RAYSCOPE_TEST"
         scene.render.resolution_x = scene.render.resolution_y = 8
         bpy.ops.render.render()
-        scene.render.engine = engine
     finally:
+        bpy.ops.wm.read_homefile(use_factory_startup=True)
         bpy.utils.unregister_class(Engine)
     return box[0]
 
