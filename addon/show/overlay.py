@@ -124,7 +124,6 @@ def picture(pixels, texels, n, projection):
     target = gpu.types.GPUTexture((width, height), format="RGBA32F", data=gpu.types.Buffer("FLOAT", pixels.size, pixels.ravel()))
     frame = gpu.types.GPUFrameBuffer(color_slots=target)
     with frame.bind():
-        frame.viewport_set(0, 0, width, height)
         Boxes(texels, n).draw(projection, in_front=True)
     drawn = target.read()
     drawn.dimensions = pixels.size
