@@ -228,7 +228,8 @@ def stoppable():
     try:
         yield progress
     finally:
-        signal.signal(signal.SIGINT, before)
+        # None: a handler that Python did not install, as in Blender; it cannot be put back.
+        signal.signal(signal.SIGINT, signal.SIG_DFL if before is None else before)
 
 
 # --- list -------------------------------------------------------------------------------------------------------------

@@ -6,6 +6,7 @@ import signal
 import subprocess
 import sys
 import threading
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -14,6 +15,9 @@ from rayscope.core import command
 from rayscope.core.command import DONE, FAILED, VERBS, WRONG_CALL, main
 from rayscope.core.fast.hierarchies.bvh import BVH
 from rayscope.core.lab import bench
+
+
+ROOT = Path(__file__).resolve().parents[2]
 
 
 def scene(size=None, n=200, **more):
@@ -285,22 +289,35 @@ def test_the_view_that_is_added_sees_everything(size):
 
 # --- as a process -----------------------------------------------------------------------------------------------------
 
-def process(*argv, **more):
-    return subprocess.run([sys.executable, "-m", "rayscope", *argv], capture_output=True, text=True, timeout=120, **more)
+@pytest.fixture
+def process(tmp_path):
+    """Starts python -m rayscope, which need not be installed."""
+    (tmp_path / "site").mkdir()
+    (tmp_path / "site" / "rayscope").symlink_to(ROOT, target_is_directory=True)
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join([str(tmp_path / "site"), *sys.path])}
+
+    def start(*argv):
+        return subprocess.Popen([sys.executable, "-m", "rayscope", *argv], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+                                env=environment, cwd=tmp_path)
+    return start
 
 
-def test_as_a_process(tmp_path):
-    done = process("list", "--json")
-    assert done.returncode == DONE and not done.stderr and json.loads(done.stdout)["verb"] == "list"
-    wrong = process("trace", str(tmp_path / "none.blend"))
-    assert wrong.returncode == WRONG_CALL and not wrong.stdout and len(wrong.stderr.splitlines()) == 1
-    assert process("--version").stdout.startswith("Rayscope ") and process("trace", "--help").returncode == DONE
+def test_as_a_process(process, tmp_path):
+    def finished(*argv):
+        with process(*argv) as run:
+            return *run.communicate(timeout=120), run.returncode
+
+    out, err, code = finished("list", "--json")
+    assert code == DONE and not err and json.loads(out)["verb"] == "list"
+    out, err, code = finished("trace", str(tmp_path / "none.blend"))
+    assert code == WRONG_CALL and not out and len(err.splitlines()) == 1
+    assert finished("--version")[0].startswith("Rayscope ") and finished("trace", "--help")[2] == DONE
 
 
-def test_a_reader_that_leaves_early_is_no_error():
-    with subprocess.Popen([sys.executable, "-m", "rayscope", "list"], stdout=subprocess.PIPE, stderr=subprocess.PIPE) as run:
+def test_a_reader_that_leaves_early_is_no_error(process):
+    with process("list") as run:
         run.stdout.close()
-        assert run.stderr.read() == b"" and run.wait(60) == FAILED
+        assert run.stderr.read() == "" and run.wait(60) == FAILED
 
 
 def test_every_verb_has_help_and_json():

@@ -1,12 +1,15 @@
 """Embree and Blender's BVHTree: the same answers as brute force, in the same form."""
+import os
 import subprocess
 import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
 from rayscope.core import Mesh, MissingPackageError, Object, Scene, SceneError, build, solids
 from rayscope.core.peers import peer
 
+ROOT = Path(__file__).resolve().parents[2]
 FIELDS = ("t", "primitive", "object", "u", "v", "normal", "point", "error")
 
 
@@ -121,12 +124,14 @@ def test_solids_are_refused(name):
 
 
 @pytest.mark.parametrize("technique, package", [("embree", "embreex"), ("mathutils", "bpy")])
-def test_a_missing_package_is_named(technique, package):
+def test_a_missing_package_is_named(technique, package, tmp_path):
+    (tmp_path / "rayscope").symlink_to(ROOT, target_is_directory=True)
     code = ("import sys; sys.modules.update(dict.fromkeys(['embreex', 'mathutils', 'bpy']))\n"
             "from rayscope.core import Scene, build, MissingPackageError\n"
             f"try: build(Scene(), {technique!r})\nexcept MissingPackageError as error: print(error)\n"
             "print(len(build(Scene.from_triangles([(0, 0, 0), (1, 0, 0), (0, 1, 0)], [(0, 1, 2)]), 'brute').closest([(0, 0, 1)], [(0, 0, -1)])))")
-    said = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60)
+    said = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60,
+                          env={**os.environ, "PYTHONPATH": os.pathsep.join([str(tmp_path), *sys.path])})
     line, ok = said.stdout.splitlines()
     assert f"pip install {package}" in line and ok == "1"
 
