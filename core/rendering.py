@@ -163,6 +163,10 @@ class Rendering:
         if scene.camera is None:
             raise SceneError(f"{scene.name}: there is no camera to see it from. Add one (in Blender: Add > Camera, "
                              "then View > Cameras > Set Active Object as Camera).")
+        with np.errstate(all="ignore"):
+            if not all(np.isfinite(v).all() for v in (*scene.camera.frame(), scene.camera.window)):
+                raise SceneError(f"{scene.camera.name}: it has no place or direction, or its picture no size (a scale of zero, NaN "
+                                 "or infinite numbers); reset its transform.")
         self.region = _check_region(region, self.size)
         names = [name for name in PASSES if self.count or name not in COUNTED_PASSES]
         self._progress, self._fraction, self._told = progress, 0.0, -math.inf

@@ -84,6 +84,13 @@ def simple(**more):
                                 camera=Camera.look_at((0, -2, 3), (0, 0, 0)), **more)
 
 
+def simple_with(camera):
+    """The simple scene with another camera."""
+    scene = simple()
+    scene.camera = camera
+    return scene
+
+
 @pytest.mark.parametrize("samples, depth, camera", [(1, 4, "perspective"), (3, 2, "perspective"), (1, 3, "orthographic")])
 def test_both_cores_draw_the_same_picture(samples, depth, camera):
     scene = everything()
@@ -301,6 +308,7 @@ def test_what_cannot_be_done_is_said():
     scene = simple()
     for error, words, arguments in (
             (SceneError, "camera", {"scene": Scene(name="Bare")}),
+            (SceneError, "Flat: .* scale of zero", {"scene": simple_with(Camera(np.diag([1.0, 0, 1, 1]), name="Flat"))}),
             (SceneError, "between 1 and", {"size": (0, 10)}), (SceneError, "between 1 and", {"size": (100_000, 100_000)}),
             (SceneError, "whole numbers", {"size": "big"}),
             (SceneError, "empty", {"region": (5, 5, 5, 9)}), (SceneError, "reaches out", {"region": (0, 0, 999, 9)}),

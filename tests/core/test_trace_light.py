@@ -371,3 +371,21 @@ def test_soft_shadow_is_the_visible_share_of_the_light(core):
         share = (seen(core, [floor(LAMBERT), screen], view, [lamp], samples=256)
                  / seen(core, [floor(LAMBERT)], view, [lamp], samples=1))
         np.testing.assert_allclose(share, 0.5, atol=0.12)
+
+
+@CORES
+@pytest.mark.parametrize("glassy", [False, True])
+def test_a_lamp_in_the_plane_of_the_ceiling_shines(core, glassy):
+    """Rounding decides nowhere whether the ceiling is before or behind the lamp: all of the floor is lit."""
+    z = 2.7100000000000004
+    ceiling = quad([(-9.1, -9.3, z), (-9.1, 9.7, z), (9.9, 9.7, z), (9.9, -9.3, z)], LAMBERT)
+    lamps = [Light("point", "point", (1, 1, 1), position=(0.37, 0.11, z)),
+             Light("area", "area", (1, 1, 1), position=(0.1, 0.2, z), axes=((0.3, 0, 0), (0, 0.3, 0)))]
+    camera = eye((0.3, 0.1, 2), (0.3, 0.1, 0), width=8.0)
+    # Glass anywhere in the scene makes shadow rays go another way.
+    extra = [floor(Material("glass", transmission=1.0), z=-5.0)] if glassy else []
+    for lamp in lamps:
+        scene = Scene([floor(LAMBERT), ceiling, *extra], [lamp], camera, DARK)
+        lit = trace(scene, "brute", core, size=(12, 12), samples=2).image[..., 0]
+        without = trace(Scene([floor(LAMBERT), *extra], [lamp], camera, DARK), "brute", core, size=(12, 12), samples=2).image[..., 0]
+        np.testing.assert_allclose(lit, without, rtol=1e-6)

@@ -9,7 +9,7 @@ from .sampling import LIGHTS, number
 from .vectors import dot, unit
 
 
-def lit(table, surface, d, lights, transmitted, key):
+def lit(table, surface, d, lights, transmitted, key, check):
     """What surfaces reflect of the lights.
 
     Parameters
@@ -24,6 +24,8 @@ def lit(table, surface, d, lights, transmitted, key):
         the points `which` from `to`.
     key : ndarray of uint64, or None
         Keys of the rays, where lights have an extent to be sampled.
+    check : callable
+        Called before each light; may raise Cancelled.
 
     Returns
     -------
@@ -32,6 +34,7 @@ def lit(table, surface, d, lights, transmitted, key):
     total = np.zeros_like(surface.base)
     view = unit(d)
     for k, light in enumerate(lights):
+        check()
         u, v = (None, None) if key is None else (number(key, LIGHTS + 2 * k), number(key, LIGHTS + 2 * k + 1))
         to, reach, towards, irradiance = arriving(light, surface.point, u, v)
         cosine = dot(surface.shading, towards)

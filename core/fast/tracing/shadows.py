@@ -33,11 +33,11 @@ def filtered(closest, surfaces, o, d, reach):
         ``closest(which, o, d, t_max)`` gives the Hits of the rays `which`.
     surfaces : Surfaces
     o, d : ndarray, shape (3, n)
-    reach : float
+    reach : float or ndarray, shape (n,)
         Distance of the light in multiples of d.
     """
     colour = np.ones_like(o)
-    which, left = np.arange(o.shape[1]), np.full(o.shape[1], reach)
+    which, left = np.arange(o.shape[1]), np.broadcast_to(reach, o.shape[1])
     while len(which):
         hits = closest(which, o, d, left)
         met = np.flatnonzero(hits.primitive >= 0)

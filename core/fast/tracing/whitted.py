@@ -20,6 +20,8 @@ from .vectors import dot, pushed, unit
 
 #: Rays of a wave, about.
 WAVE = 65_536
+#: Rounding of positions on rays, relative to the scene's largest coordinate.
+ROUNDING = 32 * 2.0**-52
 #: Side of the tiles that the picture is made in.
 TILE = 256
 
@@ -103,6 +105,7 @@ class Whitted:
         self.transparent = any(m.transparent for m in materials)
         self.coloured_shadows = self.transparent or any(m.refracts for m in materials)
         self.lights = [light for light in scene.lights if any(light.colour)]
+        self.rounding = ROUNDING * np.abs(scene.bounds()).max() if "shadow" in structures else 0.0
         self.soft = samples > 1 and any(light.has_extent for light in self.lights)
 
     def tile(self, x0, y0, x1, y1, sample):
@@ -193,7 +196,7 @@ class Whitted:
             key = None if wave.key is None else wave.key[met]
             pixel = wave.pixel[met]
             seen += lit(table, surface, wave.d[:, met], self.lights,
-                        lambda s, which, to, reach: self._transmitted(s, which, to, reach, pixel), key)
+                        lambda s, which, to, reach: self._transmitted(s, which, to, reach, pixel), key, self.check)
         self._add(wave.pixel[met], wave.weight[:, met] * surface.alpha * seen)
 
     def _add(self, pixel, radiance):
@@ -218,8 +221,11 @@ class Whitted:
         """Share of light that reaches the surfaces `which` from where `to` points; the shadow rays."""
         point = surface.point[:, which]
         o = pushed(point, surface.error[which], surface.normal[:, which], to)
-        # The ray starts beside the point, and must still end at the light.
-        d = to + (point - o) if math.isfinite(reach) else to
+        d = to
+        if math.isfinite(reach):
+            # The ray starts beside the point, and must still end at the light; a surface that the light lies in does not shade it.
+            d = to + (point - o)
+            reach = np.maximum(1.0 - self.rounding / np.abs(d).max(axis=0), 0.0)
         pixel = pixel[which]
         if not self.coloured_shadows:
             blocked, counts = self.probe["shadow"].occluded(o, d, reach)

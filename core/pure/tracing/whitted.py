@@ -16,6 +16,8 @@ from .probe import COUNTED, Probe
 from .surface import Surfaces
 from .vectors import add, dot, minus, mul, pushed, times, unit
 
+#: Rounding of positions on rays, relative to the scene's largest coordinate.
+ROUNDING = 32 * 2.0**-52
 #: Side of the tiles that the picture is made in.
 TILE = 16
 
@@ -89,6 +91,7 @@ class Whitted:
         self.transparent = any(m.transparent for m in materials)
         self.coloured_shadows = self.transparent or any(m.refracts for m in materials)
         self.lights = [light for light in scene.lights if any(light.colour)]
+        self.rounding = ROUNDING * max(abs(x) for corner in scene.bounds() for x in corner.tolist()) if "shadow" in structures else 0.0
         self.soft = samples > 1 and any(light.has_extent for light in self.lights)
 
     def tile(self, x0, y0, x1, y1, sample):
@@ -181,8 +184,11 @@ class Whitted:
     def _transmitted(self, surface, to, reach):
         """Share of light, a colour, that reaches a surface from where `to` points; the shadow ray."""
         o = pushed(surface.point, surface.error, surface.normal, to)
-        # The ray starts beside the point, and must still end at the light.
-        d = add(to, minus(surface.point, o)) if math.isfinite(reach) else to
+        d = to
+        if math.isfinite(reach):
+            # The ray starts beside the point, and must still end at the light; a surface that the light lies in does not shade it.
+            d = add(to, minus(surface.point, o))
+            reach = max(1.0 - self.rounding / max(map(abs, d)), 0.0)
         if not self.coloured_shadows:
             blocked, counter = self.probe["shadow"].occluded(o, d, reach)
             self._count(SHADOW, blocked, counter)
