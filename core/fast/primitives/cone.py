@@ -100,6 +100,10 @@ class Cones(UnitShapes):
         return (np.where(side, np.arctan2(p[1], p[0]) / (2.0 * np.pi) % 1.0, 0.5 * p[0] + 0.5),
                 np.where(side, p[2], 0.5 * p[1] + 0.5))
 
+    def contains(self, p, item):
+        w = 1.0 - self.k[item] * p[2]
+        return (p[2] >= 0.0) & (p[2] <= 1.0) & (p[0] * p[0] + p[1] * p[1] <= w * w)
+
     def reach(self, w, item):
         across = np.sqrt(w[0] * w[0] + w[1] * w[1])
         top = self.ratio[item] * across

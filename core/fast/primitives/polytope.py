@@ -38,6 +38,9 @@ class Polytopes(UnitShapes):
     def normal(self, p, face, item):
         return np.array([normal for normal, _ in self.PLANES]).T[:, face]
 
+    def contains(self, p, item):
+        return np.logical_and.reduce([_along(normal, p) <= distance for normal, distance in self.PLANES])
+
     def reach(self, w, item):
         along = [w[0] * x + w[1] * y + w[2] * z for x, y, z in self.CORNERS]
         return np.minimum.reduce(along), np.maximum.reduce(along)

@@ -13,7 +13,7 @@ from ...scene.solids import place
 
 EPSILON = 2.0**-52
 #: Steps after which two shapes not yet proved to be apart count as touching.
-STEPS = 16
+STEPS = 32
 
 #: Name of a kind -> (file in this folder, its class).
 CLASSES = {"sphere": ("sphere", "Spheres"), "box": ("box", "Boxes"), "cylinder": ("cylinder", "Cylinders"),
@@ -110,6 +110,10 @@ class UnitShapes:
         """Surface parameters u, v of points on it."""
         raise NotImplementedError
 
+    def contains(self, p, item):
+        """Bool per point: whether it lies within the unit shape, were it closed."""
+        raise NotImplementedError
+
     def reach(self, w, item):
         """Least and greatest w . x over the unit shape."""
         raise NotImplementedError
@@ -194,7 +198,8 @@ class UnitShapes:
         """Bool per pair: whether the solid, its inside included, touches the box.
 
         Gilbert (1966): of all differences between a point of the solid and one of the box, the one nearest to zero is
-        approached. A plane across it proves that they are apart; without a proof they are not.
+        approached. A plane across it proves that they are apart, a point of the box in the solid that they are not;
+        without a proof they are not.
         """
         touches = ((self.lo[item] <= hi) & (self.hi[item] >= lo)).all(axis=1)
         open_ = np.flatnonzero(touches)
@@ -210,7 +215,8 @@ class UnitShapes:
             b = c - origin
             b = np.stack([w[r, 0] * b[0] + w[r, 1] * b[1] + w[r, 2] * b[2] for r in range(3)])
             if x is None:
-                x = -b
+                # x is the difference, `place` its end in the box.
+                x, place = -b, b
             toward = [w[0, k] * x[0] + w[1, k] * x[1] + w[2, k] * x[2] for k in range(3)]
             corner = [np.copysign(h[k], toward[k]) for k in range(3)]
             corner = b + np.stack([w[r, 0] * corner[0] + w[r, 1] * corner[1] + w[r, 2] * corner[2] for r in range(3)])
@@ -224,8 +230,9 @@ class UnitShapes:
             # Nearest to zero on the way from x to y.
             with np.errstate(all="ignore"):
                 s = np.clip(-dot(x, e) / length, 0.0, 1.0)
-            going = np.flatnonzero(~apart & (length > 0.0))
-            open_, x = open_[going], (x + s * e)[:, going]
+            place = place + s * (corner - place)
+            going = np.flatnonzero(~apart & (length > 0.0) & ~self.contains(place, i))
+            open_, x, place = open_[going], (x + s * e)[:, going], place[:, going]
         return touches
 
     def clip(self, item, lo, hi):

@@ -36,6 +36,9 @@ class Spheres(UnitShapes):
         """Longitude from 0 to 1, and the angle from +z over pi."""
         return np.arctan2(p[1], p[0]) / (2.0 * np.pi) % 1.0, np.arccos(np.clip(p[2], -1.0, 1.0)) / np.pi
 
+    def contains(self, p, item):
+        return dot(p, p) <= 1.0
+
     def reach(self, w, item):
         length = np.sqrt(dot(w, w))
         return -length, length

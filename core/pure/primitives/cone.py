@@ -110,6 +110,10 @@ class Cone(UnitShape):
             return math.atan2(p[1], p[0]) / math.tau % 1.0, p[2]
         return 0.5 * p[0] + 0.5, 0.5 * p[1] + 0.5
 
+    def contains(self, p):
+        w = 1.0 - self.k * p[2]
+        return 0.0 <= p[2] <= 1.0 and p[0] * p[0] + p[1] * p[1] <= w * w
+
     def reach(self, w):
         across = math.sqrt(w[0] * w[0] + w[1] * w[1])
         top = self.ratio * across

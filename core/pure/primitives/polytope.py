@@ -38,6 +38,9 @@ class Polytope(UnitShape):
     def outward(self, p, face):
         return self.PLANES[face][0]
 
+    def contains(self, p):
+        return all(dot(normal, p) <= distance for normal, distance in self.PLANES)
+
     def reach(self, w):
         along = [dot(w, corner) for corner in self.CORNERS]
         return min(along), max(along)

@@ -14,7 +14,7 @@ from .affine import unit
 
 EPSILON = 2.0**-52
 #: Steps after which two shapes not yet proved to be apart count as touching.
-STEPS = 16
+STEPS = 32
 
 #: Name of a kind -> (file in this folder, what makes the list of its solids from placed ones).
 MAKERS = {"sphere": ("sphere", "Sphere"), "box": ("box", "Box"), "cylinder": ("cylinder", "Cylinder"),
@@ -121,6 +121,10 @@ class UnitShape(Primitive):
         """Surface parameters u, v of a point on it."""
         raise NotImplementedError
 
+    def contains(self, p):
+        """Whether a point lies within the unit shape, were it closed."""
+        raise NotImplementedError
+
     def reach(self, w):
         """Least and greatest w . x over the unit shape."""
         raise NotImplementedError
@@ -171,7 +175,8 @@ class UnitShape(Primitive):
         """Whether the solid, its inside included, touches the box.
 
         Gilbert (1966): of all differences between a point of the solid and one of the box, the one nearest to zero is
-        approached. A plane across it proves that they are apart; without a proof they are not.
+        approached. A plane across it proves that they are apart, a point of the box in the solid that they are not;
+        without a proof they are not.
         """
         if not box_overlaps(self.lo, self.hi, lo, hi):
             return False
@@ -179,7 +184,8 @@ class UnitShape(Primitive):
         # In unit space the box is centred at b, and its half-edges are columns of the inverse.
         b = [0.5 * (l + h) - c for l, h, c in zip(lo, hi, self.origin)]
         b = [dot(row, b) for row in self.inverse]
-        x = [-v for v in b]
+        # x is the difference, `place` its end in the box.
+        x, place = [-v for v in b], b
         for _ in range(STEPS):
             toward = [w0 * x[0] + w1 * x[1] + w2 * x[2] for w0, w1, w2 in zip(*self.inverse)]
             corner = [math.copysign(h, s) for h, s in zip(half, toward)]
@@ -193,6 +199,9 @@ class UnitShape(Primitive):
                 break
             # Nearest to zero on the way from x to y.
             s = clamp(-dot(x, e) / length, 0.0, 1.0)
+            place = [p + s * (c - p) for p, c in zip(place, corner)]
+            if self.contains(place):
+                break
             x = [p + s * q for p, q in zip(x, e)]
         return True
 

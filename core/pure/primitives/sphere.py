@@ -40,6 +40,9 @@ class Sphere(UnitShape):
         """Longitude from 0 to 1, and the angle from +z over pi."""
         return math.atan2(p[1], p[0]) / math.tau % 1.0, math.acos(clamp(p[2], -1.0, 1.0)) / math.pi
 
+    def contains(self, p):
+        return dot(p, p) <= 1.0
+
     def reach(self, w):
         length = math.sqrt(dot(w, w))
         return -length, length
