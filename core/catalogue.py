@@ -72,6 +72,12 @@ GRID = (
     Parameter("density", 4.0, "Cells per primitive", low=1e-3, high=1000.0),
     Parameter("resolution", 0, "Cells along the longest axis; 0 means by density", low=0, high=4096),
 )
+WALKS = ("root", "intervals", "links", "heap")
+WALK_HELP = ("How the next cell is found: from the root each time; by cutting the ray into intervals first; along links to neighbours; "
+             "depth first with a heap")
+STOPS = ("depth", "memory", "cost")
+STOP_HELP = "When cells are divided no more: by depth and number of primitives; when max_bytes are used; where it does not pay"
+MAX_BYTES = Parameter("max_bytes", 64e6, "With stop = memory: cells are divided until so much is used", low=1e3, high=1e12, unit="bytes")
 
 TECHNIQUES = (
     Technique("brute", "Brute Force", "hierarchies", "brute", "Brute",
@@ -90,11 +96,18 @@ TECHNIQUES = (
               "Equal cells, walked with a 3D digital differential analyser",
               parameters=(*GRID, MAILBOX, LISTS)),
     Technique("octree", "Octree", "subdivision", "octree", "Octree",
-              "Glassner 1984; Samet 2006",
+              "Glassner 1984; Whang et al. 1995; Samet 2006",
               "Cells halved along all three axes at once",
               parameters=(
-                  Parameter("max_depth", 8, "Levels below the root, at most (K)", low=0, high=21),
+                  Parameter("walk", "root", WALK_HELP, choices=WALKS),
+                  Parameter("storage", "pointers", "Cells with pointers to children; leaves alone, in Morton order; leaves alone, in a hash table "
+                            "by Glassner's names. The latter two are walked from the root only", choices=("pointers", "linear", "hashed")),
+                  Parameter("split", "centre", "Where cells are divided: in the middle, or at the cheapest of ten planes along each axis (Octree-R)",
+                            choices=("centre", "cost")),
+                  Parameter("stop", "depth", STOP_HELP, choices=STOPS),
+                  Parameter("max_depth", 8, "Levels below the root, at most (K)", low=0, high=20),
                   Parameter("leaf_size", 8, "A cell with more primitives (M) is divided", low=1, high=1024),
+                  MAX_BYTES, MAILBOX, LISTS,
               )),
     Technique("embree", "Embree", "peers", "embree", "Embree",
               "Wald et al. 2014", "Intel's ray tracing kernels, through the package embreex",

@@ -2,6 +2,12 @@
 
 import math
 
+from .errors import Notice
+
+#: Division stops when the leaves hold more references than this, ...
+REFERENCES_AT_LEAST = 10_000
+#: ... or this many a primitive, whichever is larger: primitives that overlap cannot be told apart by any division.
+REFERENCES_PER_PRIMITIVE = 64
 #: Part of a cell's edge (of a grid), or of the root's longest edge (of a tree), by which cells overlap, so that a walk off
 #: by rounding errors meets every primitive all the same.
 GRID_OVERLAP, TREE_OVERLAP = 2.0**-20, 2.0**-30
@@ -53,3 +59,11 @@ def too_many(name, cells, most, size, n, rule, density):
         fits = fits * 15 // 16
     return (f"{name}: {' x '.join(map(str, cells))} cells are more than the {most} that fit into memory. "
             f"Set resolution to {fits} or less.")
+
+
+def limit_notice(name, limit, lo, hi, level, count):
+    """What is said when division stopped because there were too many references."""
+    def text(point):
+        return "(" + ", ".join(f"{x:.4g}" for x in point) + ")"
+    return Notice(name, f"division stopped at {limit} references to primitives, at the cell {text(lo)} .. {text(hi)} on level {level} "
+                  f"with {count} primitives. Primitives that overlap cannot be separated; use a smaller max_depth or a larger leaf_size.")

@@ -99,10 +99,10 @@ class Visits:
         self.mailbox = PairSet() if mailbox else None
         self.marks = PairSet() if lists.list_of is not None else None
 
-    def enter(self, ray, cell, step=True):
+    def enter(self, ray, cell):
         """Rays enter cells, at most one each: test what is there, unless it was tested before."""
         number, first, count = self.lists.of(cell)
-        if self.counts and step:
+        if self.counts:
             self.counts.steps(ray)
         filled = np.flatnonzero(count)
         if self.marks is not None:

@@ -1,0 +1,237 @@
+"""How a tree of cells grows, and when it stops: by depth and count, by memory, by cost.
+
+What dividing a cell means is the business of a tree's own ``divide``; here cells are chosen, many at a time.
+"""
+
+import heapq
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from ...cells import REFERENCES_AT_LEAST, REFERENCES_PER_PRIMITIVE, limit_notice
+from ...hits import box_area
+from .lists import ranges
+
+#: Cells divided together where they are taken from a queue one by one.
+BATCH = 256
+
+
+@dataclass
+class Cells:
+    """Some cells with what is in them.
+
+    Attributes
+    ----------
+    lo, hi : ndarray, shape (m, 3)
+    count : ndarray, shape (m,)
+        Primitives in each; theirs are the next `count` entries of `item` and of all arrays in `more`.
+    item : ndarray
+    more : tuple of ndarray
+        What else a tree keeps for each reference.
+    """
+
+    lo: np.ndarray
+    hi: np.ndarray
+    count: np.ndarray
+    item: np.ndarray
+    more: tuple = ()
+
+    def take(self, index):
+        """Some of the cells."""
+        first = np.cumsum(self.count) - self.count
+        refs = ranges(first[index], self.count[index])
+        return Cells(self.lo[index], self.hi[index], self.count[index], self.item[refs], tuple(a[refs] for a in self.more))
+
+    @property
+    def cell(self):
+        """The cell of each reference."""
+        return np.repeat(np.arange(len(self.count)), self.count)
+
+
+@dataclass
+class Tree:
+    """Cells as columns, parents before children; the root is the first.
+
+    Attributes
+    ----------
+    lo, hi : ndarray, shape (m, 3)
+    level, parent, child : ndarray, shape (m,)
+        `child` is the first child's number, -1 in leaves; its siblings follow.
+    plane : ndarray, shape (3, m)
+        Where a cell is divided, inf along axes along which it is not.
+    count : ndarray, shape (m,)
+        Primitives in leaves; 0 in inner cells.
+    item : ndarray
+        Of all leaves, in the order of the cells.
+    """
+
+    lo: list = field(default_factory=list)
+    hi: list = field(default_factory=list)
+    level: list = field(default_factory=list)
+    parent: list = field(default_factory=list)
+    child: list = field(default_factory=list)
+    plane: list = field(default_factory=list)
+    count: list = field(default_factory=list)
+    item: list = field(default_factory=list)
+    n: int = 0
+
+    def add(self, cells, level, parent):
+        """Add cells; their numbers."""
+        m = len(cells.count)
+        for column, values in ((self.lo, cells.lo), (self.hi, cells.hi), (self.level, np.broadcast_to(level, m)),
+                               (self.parent, np.broadcast_to(parent, m))):
+            column.append(values)
+        self.n += m
+        return np.arange(self.n - m, self.n)
+
+
+def grow(divide, root, arity, n, stop, max_depth, leaf_size, max_bytes, node_bytes, reference_bytes, progress, name, notices):
+    """Grow a tree.
+
+    Parameters
+    ----------
+    divide : callable
+        (cells) -> (plane (3, m), children: Cells, cost (m,)): each cell's `arity` children stand one after the other,
+        and `cost` is the expected cost of a ray in the divided cell, in tests. The plane of a cell that cannot be
+        divided is inf along all axes.
+    root : Cells
+    n : int
+        Primitives.
+    stop : {"depth", "memory", "cost"}
+        depth: a cell of more than `leaf_size` primitives is divided down to level `max_depth`. memory: so are the cells
+        that a random ray tests most in, one after the other, until `max_bytes` are used. cost: as depth, but only where
+        that is cheaper for a random ray than not dividing; a few divisions that do not pay are allowed on the way.
+
+    Returns
+    -------
+    Tree, with arrays for columns
+    """
+    growth = _Growth(divide, arity, n, max_depth, leaf_size, progress, name, notices)
+    if stop == "memory":
+        growth.by_memory(root, max_bytes, node_bytes, reference_bytes)
+    else:
+        growth.by_level(root, by_cost=stop == "cost")
+    return growth.finished()
+
+
+class _Growth:
+    def __init__(self, divide, arity, n, max_depth, leaf_size, progress, name, notices):
+        self.divide, self.arity, self.n = divide, arity, n
+        self.max_depth, self.leaf_size, self.progress, self.name, self.notices = max_depth, leaf_size, progress, name, notices
+        self.limit = max(REFERENCES_AT_LEAST, REFERENCES_PER_PRIMITIVE * n)
+        self.tree, self.divided, self.leaves = Tree(), [], []
+
+    def by_level(self, root, by_cost):
+        """All cells of a level together."""
+        cells, number, level = root, self.tree.add(root, 0, -1), 0
+        bad = np.zeros(1, np.int64)
+        settled = 0
+        while len(number):
+            wanted = np.flatnonzero(cells.count > self.leaf_size) if level < self.max_depth else np.zeros(0, np.int64)
+            some = cells.take(wanted)
+            plane, children, cost = self.divide(some)
+            good = np.isfinite(plane).any(axis=0)
+            misses = bad[wanted]
+            if by_cost:
+                misses = misses + (cost >= some.count)
+                good &= (misses <= BAD_AT_MOST) & ~((cost > 4.0 * some.count) & (some.count < 16))
+            good = self._guarded(good, settled + cells.count.sum(), some, children, level)
+            kept = np.flatnonzero(good)
+            leaf = np.ones(len(number), bool)
+            leaf[wanted[kept]] = False
+            leaf = np.flatnonzero(leaf)
+            self._leaves(number[leaf], cells.take(leaf))
+            settled += int(cells.count[leaf].sum())
+            children = children.take((kept[:, None] * self.arity + np.arange(self.arity)).ravel())
+            parent = number[wanted[kept]]
+            number = self.tree.add(children, level + 1, np.repeat(parent, self.arity))
+            self.divided.append((parent, number[::self.arity], plane[:, kept]))
+            cells, bad, level = children, np.repeat(misses[kept], self.arity), level + 1
+            self.progress(level / (self.max_depth + 1))
+
+    def _guarded(self, good, references, some, children, level):
+        """Divide no more cells once there are too many references."""
+        growth = np.where(good, children.count.reshape(-1, self.arity).sum(axis=1) - some.count, 0)
+        over = np.flatnonzero(good & (references + np.cumsum(growth) - growth > self.limit))
+        if len(over):
+            good = good.copy()
+            good[over] = False
+            self._notice(some.lo[over[0]], some.hi[over[0]], level, int(some.count[over[0]]))
+        return good
+
+    def _notice(self, lo, hi, level, count):
+        if not self.notices:
+            self.notices.append(limit_notice(self.name, self.limit, lo, hi, level, count))
+
+    def by_memory(self, root, max_bytes, node_bytes, reference_bytes):
+        """One cell after the other, the one first in which a random ray tests most."""
+        tree, ready, queue = self.tree, {}, []
+        number = tree.add(root, 0, -1)
+        used, references = node_bytes + reference_bytes * int(root.count[0]), int(root.count[0])
+        contents = {}
+
+        def offer(number, cells, level):
+            first = np.cumsum(cells.count) - cells.count
+            area = box_area(cells.lo, cells.hi)
+            for k, cell in enumerate(number.tolist()):
+                contents[cell] = cells.take(np.array([k])) if len(number) > 1 else cells
+                if cells.count[k] > self.leaf_size and level < self.max_depth:
+                    heapq.heappush(queue, (-float(area[k]) * int(cells.count[k]), cell, level))
+            return first
+
+        offer(number, root, 0)
+        while queue and used < max_bytes:
+            entry = heapq.heappop(queue)
+            _, cell, level = entry
+            if cell not in ready:
+                # Its division depends on itself alone, so the next cells of the queue are divided along with it.
+                batch = [cell, *(c for _, c, _ in heapq.nsmallest(BATCH, queue) if c not in ready)]
+                some = [contents[c] for c in batch]
+                plane, children, _ = self.divide(joined(some))
+                for k, c in enumerate(batch):
+                    ready[c] = plane[:, k:k + 1], children.take(np.arange(k * self.arity, (k + 1) * self.arity))
+            plane, children = ready.pop(cell)
+            if not np.isfinite(plane).any():
+                continue
+            if references > self.limit:
+                mine = contents[cell]
+                self._notice(mine.lo[0], mine.hi[0], level, int(mine.count[0]))
+                break
+            more = int(children.count.sum() - contents.pop(cell).count[0])
+            used += self.arity * node_bytes + more * reference_bytes
+            references += more
+            number = tree.add(children, level + 1, cell)
+            self.divided.append((np.array([cell]), number[:1], plane))
+            offer(number, children, level + 1)
+            self.progress(min(1.0, used / max_bytes))
+        for cell, cells in contents.items():
+            self._leaves(np.array([cell]), cells)
+
+    def _leaves(self, number, cells):
+        self.leaves.append((number, cells.count, cells.item))
+
+    def finished(self):
+        """The tree with arrays for columns."""
+        t = self.tree
+        for name in ("lo", "hi", "level", "parent"):
+            setattr(t, name, np.concatenate(getattr(t, name)))
+        t.level, t.parent = t.level.astype(np.int32), t.parent.astype(np.int32)
+        t.child, t.plane, t.count = np.full(t.n, -1, np.int32), np.full((3, t.n), np.inf), np.zeros(t.n, np.int32)
+        for parent, child, plane in self.divided:
+            t.child[parent], t.plane[:, parent] = child, plane
+        number, count, item = (np.concatenate(c) for c in zip(*self.leaves))
+        t.count[number] = count
+        order = np.argsort(number, kind="stable")
+        first = np.cumsum(count) - count
+        t.item = item[ranges(first[order], count[order])].astype(np.int32)
+        return t
+
+
+#: Divisions that do not pay, allowed on the way to a leaf (Havran 2001; Pharr et al.).
+BAD_AT_MOST = 3
+
+
+def joined(some):
+    """Several Cells as one."""
+    more = tuple(np.concatenate(c) for c in zip(*(s.more for s in some))) if some[0].more else ()
+    return Cells(*(np.concatenate([getattr(s, name) for s in some]) for name in ("lo", "hi", "count", "item")), more)
