@@ -522,3 +522,22 @@ def test_where_lines_enter_and_leave():
         for k in range(200):
             alone = pure.intersections(Ray(o[k], d[k], 0.0, 0.5))
             assert alone == ((t_in[k], t_out[k], face_in[k], face_out[k]) if met[k] else None)
+
+
+@pytest.mark.parametrize("name", [*CLOSED, *OPEN])
+def test_inscribed_boxes_lie_within(name):
+    """All corners are inside, in exact arithmetic, the box has a volume, and both cores give the same."""
+    for matrix in MATRICES.values():
+        scene = unit_scene(name, matrix)
+        corners = Primitives.of(scene, None).kinds[0].inscribed_box(np.array([0]))[0]
+        pure = primitives_of(scene, None)[0].inscribed_box()
+        if name in OPEN:
+            assert np.isnan(corners).any() and pure is None
+            continue
+        np.testing.assert_array_equal(corners, pure)
+        back = exact_inverse(matrix)
+        # The far one's corners are rounded to its distance.
+        slack = 1e-9 if np.abs(matrix[:3, 3]).max() > 1e5 else 0
+        assert all(CLOSED[name][1](*back(exact(p))) <= slack for p in corners)
+        edges = corners[[1, 2, 4]] - corners[0]
+        assert abs(np.linalg.det(edges)) > 0.29 * abs(np.linalg.det(matrix[:3, :3]))

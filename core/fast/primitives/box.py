@@ -19,6 +19,10 @@ class Boxes(Polytopes):
         p[face >> 1, np.arange(len(face))] = (face & 1) * 2.0 - 1.0
         return p
 
+    def inner(self, item):
+        half = np.ones((3, len(item)))
+        return -half, half
+
     def parameters(self, p, face, item):
         """The two coordinates in the face, each from 0 to 1."""
         i = np.arange(len(face))

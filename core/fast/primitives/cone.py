@@ -109,6 +109,13 @@ class Cones(UnitShapes):
         top = self.ratio[item] * across
         return np.minimum(-across, w[2] - top), np.maximum(across, w[2] + top)
 
+    def inner(self, item):
+        # The box below z holds w(z)^2 z, which is greatest at z = 1 / (3 k).
+        k = self.k[item]
+        z = 1.0 / np.maximum(3.0 * k, 1.0)
+        half = np.where(self.capped[item], (1.0 - k * z) / np.sqrt(2.0), np.nan)
+        return np.stack([-half, -half, 0.0 * z]), np.stack([half, half, z])
+
     def furthest(self, w, item):
         across = np.sqrt(w[0] * w[0] + w[1] * w[1])
         top = w[2] + self.ratio[item] * across > across

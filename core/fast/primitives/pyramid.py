@@ -22,6 +22,12 @@ class Pyramids(Polytopes):
         q[face[side] >> 1, side] = ((face[side] & 1) * 2.0 - 1.0) * width[side]
         return q
 
+    def inner(self, item):
+        # (2 (1 - z))^2 z is greatest at a third of the height.
+        hi = np.full((3, len(item)), 1.0 / 3.0)
+        hi[:2] = 2.0 / 3.0
+        return hi * [[-1.0], [-1.0], [0.0]], hi
+
     def parameters(self, p, face, item):
         """On a side: across it, and the height; on the base: x and y, from 0 to 1."""
         across = np.where(face >> 1 == 0, p[1], p[0])

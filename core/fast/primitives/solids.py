@@ -122,6 +122,10 @@ class UnitShapes:
         """A point of the unit shape with the greatest w . x."""
         raise NotImplementedError
 
+    def inner(self, item):
+        """Corners (lo, hi) of a large box within the unit shape, columns; NaN where a line through it need not meet the surface."""
+        raise NotImplementedError
+
     # The same for all kinds.
 
     def _to_unit(self, rays, ray, item):
@@ -234,6 +238,17 @@ class UnitShapes:
             going = np.flatnonzero(~apart & (length > 0.0) & ~self.contains(place, i))
             open_, x, place = open_[going], (x + s * e)[:, going], place[:, going]
         return touches
+
+    def inscribed_box(self, item):
+        """Corners, shape (m, 8, 3), of parallelepipeds within the solids: what passes through one meets the solid. NaN for open ones."""
+        # A trifle smaller, so that rounding does not put a corner outside.
+        lo, hi = self.inner(item)
+        trim = 2.0**-40 * (hi - lo)
+        lo, hi = lo + trim, hi - trim
+        corners = np.stack([np.where(np.array([[k & 1], [k >> 1 & 1], [k >> 2]]), hi, lo) for k in range(8)])
+        m, origin = self.matrix[:, :, item], self.origin[:, item]
+        return np.stack([m[r, 0] * corners[:, 0] + m[r, 1] * corners[:, 1] + m[r, 2] * corners[:, 2] + origin[r]
+                         for r in range(3)], axis=-1).transpose(1, 0, 2)
 
     def clip(self, item, lo, hi):
         """Boxes of the parts inside boxes, by the solids' own boxes; empty where a solid does not touch."""

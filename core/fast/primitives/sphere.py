@@ -43,5 +43,9 @@ class Spheres(UnitShapes):
         length = np.sqrt(dot(w, w))
         return -length, length
 
+    def inner(self, item):
+        half = np.full((3, len(item)), 1.0 / np.sqrt(3.0))
+        return -half, half
+
     def furthest(self, w, item):
         return unit(w)

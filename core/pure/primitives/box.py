@@ -19,6 +19,9 @@ class Box(Polytope):
         p[face >> 1] = (face & 1) * 2.0 - 1.0
         return p
 
+    def inner(self):
+        return (-1.0,) * 3, (1.0,) * 3
+
     def parameters(self, p, face):
         """The two coordinates in the face, each from 0 to 1."""
         u, v = [x for axis, x in enumerate(p) if axis != face >> 1]

@@ -119,6 +119,14 @@ class Cone(UnitShape):
         top = self.ratio * across
         return min(-across, w[2] - top), max(across, w[2] + top)
 
+    def inner(self):
+        if not self.capped:
+            return None
+        # The box below z holds w(z)^2 z, which is greatest at z = 1 / (3 k).
+        z = 1.0 / max(3.0 * self.k, 1.0)
+        half = (1.0 - self.k * z) / math.sqrt(2.0)
+        return (-half, -half, 0.0), (half, half, z)
+
     def furthest(self, w):
         across = math.sqrt(w[0] * w[0] + w[1] * w[1])
         top = w[2] + self.ratio * across > across

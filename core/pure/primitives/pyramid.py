@@ -22,6 +22,10 @@ class Pyramid(Polytope):
             q[face >> 1] = ((face & 1) * 2.0 - 1.0) * width
         return q
 
+    def inner(self):
+        # (2 (1 - z))^2 z is greatest at a third of the height.
+        return (-2.0 / 3.0, -2.0 / 3.0, 0.0), (2.0 / 3.0, 2.0 / 3.0, 1.0 / 3.0)
+
     def parameters(self, p, face):
         """On a side: across it, and the height; on the base: x and y, from 0 to 1."""
         across = (p[1] if face >> 1 == 0 else p[0]) / (1.0 - p[2] or 1.0)

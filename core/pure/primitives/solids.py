@@ -133,6 +133,10 @@ class UnitShape(Primitive):
         """A point of the unit shape with the greatest w . x."""
         raise NotImplementedError
 
+    def inner(self):
+        """Corners (lo, hi) of a large box within the unit shape; None where a line through it need not meet the surface."""
+        raise NotImplementedError
+
     # The same for all kinds.
 
     def to_unit(self, ray):
@@ -204,6 +208,17 @@ class UnitShape(Primitive):
                 break
             x = [p + s * q for p, q in zip(x, e)]
         return True
+
+    def inscribed_box(self):
+        """The 8 corners of a parallelepiped within the solid: what passes through it meets the solid. None for an open one."""
+        inner = self.inner()
+        if inner is None:
+            return None
+        # A trifle smaller, so that rounding does not put a corner outside.
+        trim = [2.0**-40 * (h - l) for l, h in zip(*inner)]
+        ends = [l + s for l, s in zip(inner[0], trim)], [h - s for h, s in zip(inner[1], trim)]
+        corners = [(ends[k & 1][0], ends[k >> 1 & 1][1], ends[k >> 2][2]) for k in range(8)]
+        return [tuple(dot(row, p) + c for row, c in zip(self.matrix, self.origin)) for p in corners]
 
     def clip(self, lo, hi):
         if not self.overlaps(lo, hi):

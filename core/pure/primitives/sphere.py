@@ -47,5 +47,9 @@ class Sphere(UnitShape):
         length = math.sqrt(dot(w, w))
         return -length, length
 
+    def inner(self):
+        half = 1.0 / math.sqrt(3.0)
+        return (-half,) * 3, (half,) * 3
+
     def furthest(self, w):
         return unit(w)
