@@ -1,7 +1,5 @@
 """Exact decisions, for the few cases in which rounding errors are as large as the numbers; the same for both cores."""
 
-from fractions import Fraction
-
 #: Edge functions whose sum is smaller than this part of the products that they consist of are calculated exactly.
 DOUBTFUL = 2.0**-40
 
@@ -22,16 +20,23 @@ def watertight(a, b, c, *corners):
         Each divided by their sum, rounded once; or None when the ray passes outside, sees the triangle edge-on, or
         the triangle has no area.
     """
-    (ax, ay), (bx, by), (cx, cy) = (map(Fraction, p) for p in (a, b, c))
+    ax, ay, bx, by, cx, cy = _whole(*a, *b, *c)
     u, v, w = cx * by - cy * bx, ax * cy - ay * cx, bx * ay - by * ax
     det = u + v + w
-    if det == 0 or min(u / det, v / det, w / det) < 0 or _collinear(*corners):
+    if det == 0 or min(u, v, w) < 0 < max(u, v, w) or _collinear(*corners):
         return None
-    return float(u / det), float(v / det), float(w / det)
+    return u / det, v / det, w / det
 
 
 def _collinear(a, b, c):
     """Whether three points lie on one line."""
-    a, b, c = ([Fraction(x) for x in p] for p in (a, b, c))
-    e, f = [y - x for x, y in zip(a, b)], [y - x for x, y in zip(a, c)]
+    n = _whole(*a, *b, *c)
+    e, f = [n[3 + k] - n[k] for k in range(3)], [n[6 + k] - n[k] for k in range(3)]
     return all(e[i - 2] * f[i - 1] == e[i - 1] * f[i - 2] for i in range(3))
+
+
+def _whole(*numbers):
+    """Whole numbers in the same ratios: all times one power of two."""
+    ratios = [x.as_integer_ratio() for x in numbers]
+    common = max(d for _, d in ratios)
+    return [n * (common // d) for n, d in ratios]

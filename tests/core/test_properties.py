@@ -16,7 +16,7 @@ from .datasets import DATASETS
 
 EPSILON = 2.0**-52
 BY_NAME = {d.name: d for d in DATASETS}
-#: Data sets on which all values of all parameters are tried; on the others the defaults are.
+#: Data sets on which values of parameters are tried, each on the last one and on one of the others in turn.
 FOR_PARAMETERS = ("tiny and huge", "closed mesh", "plane", "two identical", "mixed")
 
 
@@ -47,10 +47,9 @@ def cases():
         if row.family == "peers":
             continue
         for core in row.cores:
-            for parameters in variants(row, core):
-                for d in DATASETS:
-                    if parameters and d.name not in FOR_PARAMETERS:
-                        continue
+            for k, parameters in enumerate(variants(row, core)):
+                names = (FOR_PARAMETERS[k % 4], FOR_PARAMETERS[4]) if parameters else BY_NAME
+                for d in (BY_NAME[name] for name in names):
                     marks = [pytest.mark.skip(reason=f"serves {row.primitives} only")] * (row.primitives != "all" and bool(d.kinds - {row.primitives}))
                     text = "-".join([row.name, core, *(f"{k}={v}" for k, v in parameters), d.name])
                     yield pytest.param((row, core, parameters, d.name), id=text, marks=marks)
