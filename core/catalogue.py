@@ -105,7 +105,7 @@ TECHNIQUES = (
                   Parameter("split", "centre", "Where cells are divided: in the middle, or at the cheapest of ten planes along each axis (Octree-R)",
                             choices=("centre", "cost")),
                   Parameter("stop", "depth", STOP_HELP, choices=STOPS),
-                  Parameter("max_depth", 8, "Levels below the root, at most (K)", low=0, high=20),
+                  Parameter("max_depth", 8, "Levels below the root, at most (K)", low=0, high=18),
                   Parameter("leaf_size", 8, "A cell with more primitives (M) is divided", low=1, high=1024),
                   MAX_BYTES, MAILBOX, LISTS,
               )),

@@ -2,7 +2,7 @@
 
 import math
 
-from .errors import Notice
+from .errors import Notice, ParameterError
 
 #: Division stops when the leaves hold more references than this, ...
 REFERENCES_AT_LEAST = 10_000
@@ -67,3 +67,16 @@ def limit_notice(name, limit, lo, hi, level, count):
         return "(" + ", ".join(f"{x:.4g}" for x in point) + ")"
     return Notice(name, f"division stopped at {limit} references to primitives, at the cell {text(lo)} .. {text(hi)} on level {level} "
                   f"with {count} primitives. Primitives that overlap cannot be separated; use a smaller max_depth or a larger leaf_size.")
+
+
+def table_size(n):
+    """A size for a hash table of n names of cells: odd, and no multiple of 5, since names end in decimal digits."""
+    size = max(3, n * 4 // 3) | 1
+    return size + 2 * (size % 5 == 0)
+
+
+def check_storage(storage, walk, split):
+    """Raise a ParameterError where leaves without pointers (linear, hashed) are asked for more than they can do."""
+    if storage != "pointers" and (walk != "root" or split != "centre"):
+        raise ParameterError(f"octree: storage = {storage} keeps no pointers and no planes, so it goes with walk = root and split = centre "
+                             f"only, not with walk = {walk}, split = {split}.")

@@ -11,6 +11,8 @@ FIGURES = {
     "N_EE": "empty elementary cells",
     "N_ER": "references to primitives from elementary cells",
     "N_L": "lists of primitives, where cells share them",
+    "load_factor": "entries of the hash table over its size",
+    "collisions": "entries of the hash table that are not the first of their chain",
     "depth": "levels below the root",
     "memory": "bytes of the structure",
     "c_SAH": "SAH cost, c_T = c_I = 1",

@@ -65,6 +65,17 @@ class Lists:
         self.items = self.items[ranges(self.start[kept], self.count[kept])]
         self.start = np.concatenate([[0, 0], np.cumsum(self.count[kept], dtype=np.int64)])
 
+    def take(self, cell):
+        """The lists of some cells, as those of cells 0, 1, ..."""
+        some = Lists.__new__(Lists)
+        some.count = self.count[cell]
+        if self.list_of is not None:
+            some.start, some.items, some.list_of = self.start, self.items, self.list_of[cell]
+        else:
+            some.start, some.list_of = np.concatenate([[0], np.cumsum(some.count, dtype=np.int64)]), None
+            some.items = self.items[ranges(self.start[cell], some.count)]
+        return some
+
     @property
     def lists(self):
         """How many lists there are, the empty one not counted where it is shared."""

@@ -5,10 +5,10 @@ Glassner (1984); Octree-R with planes by cost: Whang et al. (1995).
 
 import numpy as np
 
-from ...errors import ParameterError
+from ...cells import check_storage
 from ...hits import box_area
+from . import leaf_codes
 from .growth import Cells
-from .lists import chunks
 from .tree import CellTree
 
 #: Pairs of a primitive and a cell looked at together in the build.
@@ -23,11 +23,28 @@ class Octree(CellTree):
     ARITY, NAME = 8, "octree"
 
     def build(self, progress, walk, storage, split, stop, max_depth, leaf_size, max_bytes, mailbox, lists):
-        self.split = split
+        check_storage(storage, walk, split)
+        self.split, self.storage = split, None
         self.lay_out()
         n = self.primitives.n
         root = Cells(self.lo[None], self.hi[None], np.array([n]), np.arange(n))
         self.grow(root, progress, stop, max_depth, leaf_size, max_bytes, walk, lists)
+        if storage != "pointers":
+            self.storage = leaf_codes.STORAGES[storage](self.tree, self.lo, self.hi)
+            self.lists = self.lists.take(self.storage.leaf)
+            self.tree = None
+            self.figures.update(self.storage.figures(), memory=self.storage.nbytes + self.lists.nbytes)
+
+    def locate_box(self, walk, ray, t):
+        if self.storage is None:
+            return super().locate_box(walk, ray, t)
+        return self.storage.locate(walk, ray, t)
+
+    def cells(self):
+        if not self.primitives.n or self.storage is None:
+            return super().cells()
+        _, lo, hi, level, parent, leaf = self.storage.nodes()
+        return self.boxes(lo, hi, level, parent, leaf >= 0, np.where(leaf >= 0, self.lists.count[leaf], 0))
 
     def divide(self, cells):
         """Divide cells; see ``growth.grow``."""

@@ -13,7 +13,7 @@ from ...hits import box_area
 from ..structure import Structure
 from . import growth
 from .box import EPSILON, through_box
-from .lists import Lists, Visits, ranges
+from .lists import Lists, Visits
 
 #: Rays whose stacks or intervals are kept at a time.
 RAYS = 16_384
@@ -131,15 +131,25 @@ class CellTree(Structure):
                 walk = Walk(self, rays, t_in, visits, query)
                 getattr(walk, self.parameters["walk"])(ray)
 
+    def locate_box(self, walk, ray, t):
+        """The leaves in which rays are at t, searched from the root, and their boxes lo and hi."""
+        cell = walk.locate(ray, t, np.zeros(len(ray), np.int64))
+        return cell, self.tree.lo.take(cell, axis=0), self.tree.hi.take(cell, axis=0)
+
     def cells(self):
         if not self.primitives.n:
             return super().cells()
         t = self.tree
-        below = self.lists.count.astype(np.int64)
-        for level in range(int(t.level.max()), 0, -1):
-            at = np.flatnonzero(t.level == level)
-            np.add.at(below, t.parent[at], below[at])
-        return CellBoxes.make(t.lo, t.hi, t.level, below, t.child < 0, t.parent)
+        return self.boxes(t.lo, t.hi, t.level, t.parent, t.child < 0, self.lists.count)
+
+    @staticmethod
+    def boxes(lo, hi, level, parent, leaf, count):
+        """Cells from columns; inner ones count what is below them."""
+        below = count.astype(np.int64)
+        for depth in range(int(level.max()), 0, -1):
+            at = np.flatnonzero(level == depth)
+            np.add.at(below, parent[at], below[at])
+        return CellBoxes.make(lo, hi, level, below, leaf, parent)
 
 
 #: Bytes of a cell: lo, hi, plane, level, parent, child, where its list begins, how long it is; and of a reference.
@@ -206,22 +216,21 @@ class Walk:
         """From the root for every cell: point location."""
         t = self.t_in.take(ray)
         while len(ray):
-            cell = self.locate(ray, t, np.zeros(len(ray), np.int64))
-            ray, t, _ = self.visit(ray, cell)
+            cell, lo, hi = self.structure.locate_box(self, ray, t)
+            ray, t, _ = self.visit(ray, cell, self.leaves(ray, lo, hi)[0])
 
     def links(self, ray):
         """Along the links to the neighbour behind the exit face, and down from there."""
         t, cell = self.t_in.take(ray), np.zeros(len(ray), np.int64)
         while len(ray):
             cell = self.locate(ray, t, cell)
-            face = self.leaves(ray, self.tree.lo.take(cell, axis=0), self.tree.hi.take(cell, axis=0))[1]
+            t_out, face = self.leaves(ray, self.tree.lo.take(cell, axis=0), self.tree.hi.take(cell, axis=0))
             following = self.structure.links.ravel().take(face * self.tree.n + cell)
-            ray, t, on = self.visit(ray, cell)
+            ray, t, on = self.visit(ray, cell, t_out)
             cell = following.take(on).astype(np.int64)
 
-    def visit(self, ray, cell):
-        """Test what is in leaves; the rays that go on, from where, and which of `ray` they are."""
-        t_out, _ = self.leaves(ray, self.tree.lo.take(cell, axis=0), self.tree.hi.take(cell, axis=0))
+    def visit(self, ray, cell, t_out):
+        """Test what is in leaves that rays leave at `t_out`; the rays that go on, from where, and which of `ray` they are."""
         self.visits.enter(ray, cell)
         on = np.flatnonzero((self.query.t.take(ray) > t_out) & (t_out < self.t_end.take(ray)))
         return ray.take(on), t_out.take(on), on

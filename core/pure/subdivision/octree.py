@@ -3,6 +3,8 @@
 Glassner (1984); Octree-R with planes by cost: Whang et al. (1995).
 """
 
+from ...cells import check_storage
+from . import leaf_codes
 from .tree import CellTree, Node
 
 #: Planes tried along each axis, from the middle of the cell to the median of its primitives.
@@ -15,8 +17,19 @@ class Octree(CellTree):
     NAME = "octree"
 
     def build(self, progress, walk, storage, split, stop, max_depth, leaf_size, max_bytes, mailbox, lists):
-        self.split = split
+        check_storage(storage, walk, split)
+        self.split, self.storage = split, None
         self.grow(self.root(), progress, stop, max_depth, leaf_size, max_bytes, walk, lists)
+        if storage != "pointers":
+            self.storage = leaf_codes.STORAGES[storage](self.nodes)
+            self.boxes, self.nodes = super().cells(), self.nodes[:1]
+            self.figures.update(self.storage.figures(), memory=self.storage.memory())
+
+    def locate_box(self, query, t, t_end):
+        return self.storage.locate(query, t, t_end) if self.storage else super().locate_box(query, t, t_end)
+
+    def cells(self):
+        return self.boxes if self.primitives and self.storage else super().cells()
 
     def divide(self, node):
         if self.split == "centre":

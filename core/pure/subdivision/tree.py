@@ -202,25 +202,30 @@ class CellTree(Structure):
             return
         t_in = inside[0]
         # Not before the entry, where a ray only grazes the root.
-        t_end = max(_exit(ray, root)[0], t_in)
+        t_end = max(_exit(ray, root.lo, root.hi)[0], t_in)
         getattr(self, "_walk_" + self.parameters["walk"])(query, t_in, t_end, Visits(self, query))
 
     def _walk_root(self, query, t, t_end, visits):
         """From the root for every cell: point location."""
         while True:
-            leaf = _locate(query, self.nodes[0], t, t_end)
-            t_out, _ = _exit(query.ray, leaf)
+            leaf, lo, hi = self.locate_box(query, t, t_end)
+            t_out, _ = _exit(query.ray, lo, hi)
             visits.enter(leaf.number, leaf.items, t, t_out)
             if query.t <= t_out or t_out >= t_end:
                 return
             t = t_out
+
+    def locate_box(self, query, t, t_end):
+        """The leaf in which the ray is at t, searched from the root, and its box."""
+        leaf = _locate(query, self.nodes[0], t, t_end)
+        return leaf, leaf.lo, leaf.hi
 
     def _walk_links(self, query, t, t_end, visits):
         """Along the links to the neighbour behind the exit face, and down from there."""
         node = self.nodes[0]
         while True:
             leaf = _locate(query, node, t, t_end)
-            t_out, face = _exit(query.ray, leaf)
+            t_out, face = _exit(query.ray, leaf.lo, leaf.hi)
             visits.enter(leaf.number, leaf.items, t, t_out)
             if query.t <= t_out or t_out >= t_end:
                 return
@@ -274,12 +279,12 @@ def crossing(ray, axis, plane):
     return distance * inverse if distance or math.isfinite(inverse) else -math.inf
 
 
-def _exit(ray, node):
-    """Where the ray leaves a cell: t and the face (x, y, z below, then above)."""
+def _exit(ray, lo, hi):
+    """Where the ray leaves a box: t and the face (x, y, z below, then above)."""
     t_out, face = math.inf, -1
     for axis in range(3):
         below = ray.inverse[axis] < 0.0
-        t = crossing(ray, axis, (node.lo if below else node.hi)[axis])
+        t = crossing(ray, axis, (lo if below else hi)[axis])
         if face < 0 or t < t_out:
             t_out, face = t, axis + 3 * (not below)
     return t_out, face
