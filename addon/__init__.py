@@ -4,9 +4,8 @@
 def _parts():
     """In the order of registration: operators and panels use the properties, and panels name the engine."""
     from . import command, engine
-    from .show import overlay
     from .ui import handlers, operators, panels, properties
-    return properties, engine, operators, panels, overlay, handlers, command
+    return properties, engine, operators, panels, handlers, command
 
 
 def register():

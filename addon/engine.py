@@ -3,10 +3,8 @@
 import weakref
 
 import bpy
-import numpy as np
 
-from . import tasks
-from .show import preview
+from . import show
 from ..core.errors import Cancelled, RayscopeError
 
 ENGINE = "RAYSCOPE"
@@ -66,6 +64,8 @@ class RayscopeRenderEngine(bpy.types.RenderEngine):
         self.error_set(text)
 
     def _render(self, depsgraph):
+        import numpy as np
+        from . import tasks
         scene, layer = depsgraph.scene, depsgraph.view_layer
         passes = list(passes_of(scene, layer))
         self.update_stats("", "Reading the scene")
@@ -76,18 +76,21 @@ class RayscopeRenderEngine(bpy.types.RenderEngine):
         pass_index = np.array([_pass_index(depsgraph, o.name) for o in task.scene.objects] + [0], np.float32)  # -1, nothing, takes the last
         left, bottom = region[:2] if region else (0, 0)
 
+        def flat(array):
+            return np.ascontiguousarray(array, np.float32).ravel()
+
         def write(x0, y0, x1, y1):
             part = np.s_[y0:y1, x0:x1]
             result = self.begin_result(x0 - left, y0 - bottom, x1 - x0, y1 - y0, layer=layer.name)
             target = result.layers[0].passes
-            target["Combined"].rect.foreach_set(_flat(task.result.image[part]))
+            target["Combined"].rect.foreach_set(flat(task.result.image[part]))
             for name, _, _, array in passes:
                 values = task.result.passes["object_index" if array == "pass_index" else array][part]
                 if array == "pass_index":
                     values = pass_index[values]
                 elif array == "depth":
                     values = np.where(np.isfinite(values), values, FAR_AWAY)
-                target[name].rect.foreach_set(_flat(values))
+                target[name].rect.foreach_set(flat(values))
             self.end_result(result)
 
         def progress(fraction):
@@ -111,6 +114,7 @@ class RayscopeRenderEngine(bpy.types.RenderEngine):
     def _shown(self):
         """What this viewport shows."""
         if self._preview is None:
+            from .show import preview
             self._preview = preview.Preview()
             weakref.finalize(self, self._preview.stop)  # in __del__, Blender has already taken the attributes away
         return self._preview
@@ -121,7 +125,8 @@ def border_of(scene):
     render = scene.render
     if not render.use_border:
         return None
-    width, height = tasks.picture_size(scene)
+    from .tasks import picture_size
+    width, height = picture_size(scene)
     return (int(render.border_min_x * width), int(render.border_min_y * height), int(render.border_max_x * width), int(render.border_max_y * height))
 
 
@@ -129,10 +134,6 @@ def _pass_index(depsgraph, name):
     """The pass index of an object, 0 where there is none of that name."""
     obj = depsgraph.scene.objects.get(name)
     return obj.pass_index if obj else 0
-
-
-def _flat(array):
-    return np.ascontiguousarray(array, np.float32).ravel()
 
 
 #: Panels of other engines that show what we use, by class name; those with BLENDER_RENDER in their list come besides.
@@ -156,7 +157,8 @@ def register():
 
 
 def unregister():
-    preview.stop_all()
+    if preview := show.loaded("preview"):
+        preview.stop_all()
     for panel in bpy.types.Panel.__subclasses__():
         getattr(panel, "COMPAT_ENGINES", set()).discard(ENGINE)
     bpy.utils.unregister_class(RayscopeRenderEngine)

@@ -3,6 +3,8 @@
 import bpy
 import numpy as np
 
+from ..ui import redraw
+
 NAME = "Rayscope"
 
 
@@ -31,23 +33,16 @@ def put(pixels):
     image = image_of(width, height)
     image.pixels.foreach_set(np.ascontiguousarray(pixels, np.float32).ravel())
     image.update()
-    for space in _editors(image):
-        space.tag_redraw()
+    for area in redraw.areas("IMAGE_EDITOR"):
+        if area.spaces.active.image == image:
+            area.tag_redraw()
     return image
 
 
 def show(image):
     """Show the image in an Image Editor, if one is open."""
-    for window in bpy.context.window_manager.windows:
-        for area in window.screen.areas:
-            space = area.spaces.active
-            if area.type == "IMAGE_EDITOR" and area.ui_type == "IMAGE_EDITOR" and not space.use_image_pin:
-                space.image = image
-                return
-
-
-def _editors(image):
-    for window in bpy.context.window_manager.windows:
-        for area in window.screen.areas:
-            if area.type == "IMAGE_EDITOR" and area.spaces.active.image == image:
-                yield area
+    for area in redraw.areas("IMAGE_EDITOR"):
+        space = area.spaces.active
+        if area.ui_type == "IMAGE_EDITOR" and not space.use_image_pin:
+            space.image = image
+            return

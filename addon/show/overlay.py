@@ -4,12 +4,10 @@ A redraw binds the texture and makes one draw call. The texture is made anew onl
 them change; gpu needs no more than the box's twelve edges besides.
 """
 
-import bpy
 import gpu
 import numpy as np
 
 from . import overlay_data
-from .. import session
 
 VERTEX = """
 void main()
@@ -86,15 +84,8 @@ def _shader_and_edges():
     return _gpu["shader"], _gpu["edges"]
 
 
-def draw_in_view():
-    """The 3D view's draw handler."""
-    scene = bpy.context.scene
-    built = session.built_of(scene)
-    overlay = scene.rayscope.overlay
-    if built is None or not overlay.show:
-        _gpu.pop("boxes", None)
-        _gpu.pop("signature", None)
-        return
+def draw_in_view(built, overlay):
+    """Draw what was built into the 3D view that is being drawn, with these settings."""
     signature = (built.number, overlay.signature())
     if _gpu.get("signature") != signature:
         _gpu["boxes"] = Boxes(*overlay_data.boxes(built.cells, **overlay.selection()))
@@ -130,32 +121,6 @@ def picture(pixels, texels, n, projection):
     return np.array(drawn, np.float32).reshape(height, width, 4)
 
 
-def redraw():
-    """Have all 3D views drawn again."""
-    for window in bpy.context.window_manager.windows:
-        for area in window.screen.areas:
-            if area.type == "VIEW_3D":
-                area.tag_redraw()
-
-
 def release():
     """Forget all GPU objects."""
     _gpu.clear()
-
-
-_handler = None
-
-
-def register():
-    global _handler
-    if not bpy.app.background:  # a module or `blender -b` has no view to draw in
-        _handler = bpy.types.SpaceView3D.draw_handler_add(draw_in_view, (), "WINDOW", "POST_VIEW")
-
-
-def unregister():
-    global _handler
-    if _handler is not None:
-        bpy.types.SpaceView3D.draw_handler_remove(_handler, "WINDOW")
-        _handler = None
-    release()
-    redraw()

@@ -11,6 +11,7 @@ from gpu_extras.presets import draw_texture_2d
 
 from .. import tasks, work
 from ..read import camera_from_view, read_scene
+from ..ui import redraw
 from ...core.errors import Cancelled, RayscopeError
 
 #: Pixels of the view along a side of one traced pixel: a first impression, then finer.
@@ -192,10 +193,9 @@ def _keep_redrawing():
 def _redraw():
     """The timer's function: redraw rendered viewports while there is something to come."""
     if any(preview.has_news for preview in _previews):
-        for window in bpy.context.window_manager.windows:
-            for area in window.screen.areas:
-                if area.type == "VIEW_3D" and area.spaces.active.shading.type == "RENDERED":
-                    area.tag_redraw()
+        for area in redraw.areas("VIEW_3D"):
+            if area.spaces.active.shading.type == "RENDERED":
+                area.tag_redraw()
     return REFRESH if any(preview.busy for preview in _previews) else None
 
 

@@ -6,8 +6,8 @@ it starts a thread, and a timer keeps the interface up to date; Esc stops it.
 
 import bpy
 
-from .. import session, tasks, work
-from ..show import image, overlay
+from . import redraw
+from .. import session, work
 from ...core.errors import RayscopeError
 
 #: Seconds between two looks at a job that runs.
@@ -91,7 +91,7 @@ class Work:
             context.window_manager.progress_update(job.fraction)
             context.workspace.status_text_set(f"{self.title}: {job.fraction:.0%}, Esc stops it")
             self.show(self._task)
-            _redraw_panels(context)
+            redraw.panels()
         return {"PASS_THROUGH"}
 
     def cancel(self, context):
@@ -109,10 +109,10 @@ class Work:
     def _end(self, task, job):
         if job.error:
             self.report({"ERROR"}, job.error)
-            _redraw_panels(bpy.context)
+            redraw.panels()
             return {"CANCELLED"}
         self.report({"WARNING" if job.cancelled else "INFO"}, self.finish(task, job))
-        _redraw_panels(bpy.context)
+        redraw.panels()
         return {"CANCELLED"} if job.cancelled else {"FINISHED"}
 
 
@@ -123,17 +123,6 @@ def _both(first, second):
     return progress
 
 
-def _redraw_panels(context):
-    for window in context.window_manager.windows:
-        for area in window.screen.areas:
-            if area.type == "PROPERTIES":
-                area.tag_redraw()
-            elif area.type == "VIEW_3D":
-                for region in area.regions:
-                    if region.type == "UI":
-                        region.tag_redraw()
-
-
 class RAYSCOPE_OT_build(Work, bpy.types.Operator):
     bl_idname = "rayscope.build"
     bl_label = "Build Structure"
@@ -142,6 +131,7 @@ class RAYSCOPE_OT_build(Work, bpy.types.Operator):
     title = "Building"
 
     def prepare(self, context):
+        from .. import tasks
         return tasks.Build(context)
 
     def show(self, task):
@@ -151,7 +141,7 @@ class RAYSCOPE_OT_build(Work, bpy.types.Operator):
         if job.cancelled:
             return "Building was stopped: the structure shown is the previous one"
         session.keep_built(task.uid, job.result)
-        overlay.redraw()
+        redraw.views()
         return f"Built in {job.result.index.figures['T_B']:.3g} s"
 
 
@@ -164,17 +154,23 @@ class RAYSCOPE_OT_trace(Work, bpy.types.Operator):
     title = "Tracing"
 
     def prepare(self, context):
+        from .. import tasks
         return tasks.Trace(context.evaluated_depsgraph_get())
 
     def show(self, task):
         if task.changed:
             task.changed = False
-            image.show(image.put(task.result.image))
+            self._put(task)
+
+    @staticmethod
+    def _put(task):
+        from ..show import image
+        image.show(image.put(task.result.image))
 
     def finish(self, task, job):
         if task.result is None:
             return "Tracing was stopped while the structure was built: the image is unchanged"
-        image.show(image.put(task.result.image))
+        self._put(task)
         task.keep()
         if job.cancelled:
             return f"Tracing was stopped at {job.fraction:.0%}: the image keeps what was done"
@@ -206,8 +202,8 @@ class RAYSCOPE_OT_clear(bpy.types.Operator):
 
     def execute(self, context):
         session.forget(context.scene.session_uid)
-        overlay.redraw()
-        _redraw_panels(context)
+        redraw.views()
+        redraw.panels()
         return {"FINISHED"}
 
 

@@ -214,11 +214,11 @@ class RAYSCOPE_PT_notices(Sidebar, Notices, bpy.types.Panel):
 
 
 class RAYSCOPE_RENDER_PT_structure(Properties, Structure, bpy.types.Panel):
-    bl_label = "Technique"
+    bl_label, bl_order = "Technique", -10
 
 
 class RAYSCOPE_RENDER_PT_trace(Properties, Tracing, bpy.types.Panel):
-    bl_label = "Sampling"
+    bl_label, bl_order = "Sampling", -9
 
 
 class RAYSCOPE_RENDER_PT_figures(Properties, Figures, bpy.types.Panel):

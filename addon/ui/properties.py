@@ -6,6 +6,7 @@ from itertools import groupby
 import bpy
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, PointerProperty, StringProperty
 
+from . import redraw
 from .. import session
 from ...core import catalogue
 from ...core.figures import FIGURES
@@ -86,9 +87,7 @@ RAYSCOPE_PG_figures = _group("RAYSCOPE_PG_figures", {name: _figure(name) for nam
 
 
 def _redraw(self, context):
-    if not bpy.app.background:
-        from ..show import overlay
-        overlay.redraw()
+    redraw.views()
 
 
 class RAYSCOPE_PG_overlay(bpy.types.PropertyGroup):
