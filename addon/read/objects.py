@@ -30,15 +30,21 @@ def read_objects(depsgraph, for_render, notices):
     objects : list of Object
     lights : list of Light
     """
-    hidden = _hidden_collections(depsgraph.view_layer) if for_render else set()
+    # A render's depsgraph holds what renders show; the viewport's has to be sifted.
+    sift = for_render and depsgraph.mode == "VIEWPORT"
+    hidden = _hidden_collections(depsgraph.view_layer) if sift else set()
+    if sift:
+        _note_missing(depsgraph, hidden, notices)
     geometries, materials = Geometries(notices), Materials(notices)
     objects, lights = [], []
     for instance in depsgraph.object_instances:
         obj = instance.object
         if obj.type not in NOT_TRACED and obj.type not in {"MESH", "LIGHT"}:
             continue
-        if not instance.show_self or (for_render and _hidden_in_renders(instance, hidden)):
+        if not instance.show_self or (sift and _hidden_in_renders(instance, hidden)):
             continue
+        if not instance.is_instance:
+            _note_flags(obj, notices)
         matrix = np.array(instance.matrix_world, float)
         if obj.type == "LIGHT":
             lights.append(read_light(obj, matrix, notices))
@@ -108,6 +114,27 @@ def _hidden_in_renders(instance, hidden):
     if parent.hide_render or parent.original.name_full in hidden:
         return True
     return parent.instance_type == "COLLECTION" and instance.object.hide_render
+
+
+def _note_flags(obj, notices):
+    """What an object asks for that is not traced."""
+    if obj.type == "MESH" and not obj.visible_camera:
+        notices.add(obj.name, "it is to be invisible to the camera, which is not traced: it is seen. Hide it in renders instead.")
+    if obj.is_holdout:
+        notices.add(obj.name, "a holdout is not traced; it is seen like any other object.")
+    if any(p.settings.type == "HAIR" and p.settings.render_type == "PATH" for p in obj.particle_systems):
+        notices.add(obj.name, "its hair particles cannot be traced; they were left out. Convert them to a mesh.")
+
+
+def _note_missing(depsgraph, hidden, notices):
+    """Name what a render would show but the viewport's depsgraph does not hold."""
+    layer = depsgraph.view_layer
+    missing = [o.name for o in layer.objects if o.type in {"MESH", "LIGHT", "CURVE", "FONT", "SURFACE", "META"} and not o.hide_render
+               and o.name_full not in hidden and not o.visible_get(view_layer=layer)]
+    if missing:
+        names = ", ".join(missing[:5]) + (" ..." if len(missing) > 5 else "")
+        notices.add(depsgraph.scene.name, f"hidden in the viewport and therefore not read, though shown in renders: {names}. "
+                    "Show them, or render with F12.")
 
 
 def _hidden_collections(view_layer):
