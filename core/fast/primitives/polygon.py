@@ -3,6 +3,9 @@
 Inside is decided by the crossing rule, in the sheared space of the watertight triangle test: there the ray runs along
 an axis, and neighbours see the same corners, so that a ray can neither slip between two polygons nor meet both where
 one ends. What lies exactly on an edge is hit.
+
+Of a polygon of many corners only the edges at a hit's own height need be looked at: they are sorted into bands. Hits so
+near to an edge that rounding matters are decided by the full test, so both give the same answer.
 """
 
 import numpy as np
@@ -13,6 +16,8 @@ from .triangle import Triangles
 
 #: Edges looked at together.
 EDGES = 1 << 18
+#: Polygons of more corners have bands.
+MANY = 12
 
 
 def triangles(placed):
@@ -42,6 +47,7 @@ class Polygons:
         self.lo, self.hi = np.minimum.reduceat(xyz, first, axis=1).T, np.maximum.reduceat(xyz, first, axis=1).T
         # The plane's two axes for u and v: where the normal is least.
         self.axes = np.stack([np.abs(self.corners.normal).argmax(axis=0) + k for k in (1, 2)]) % 3
+        self._bands = Bands(self) if (np.diff(self.corners.start) > MANY).any() else None
 
     def bounds(self):
         """World boxes (lo, hi), each of shape (n, 3)."""
@@ -56,7 +62,15 @@ class Polygons:
             away = dot(n, [anchor[a].take(item) - o[a].take(ray) for a in range(3)])
             t = away / dot(n, [d[a].take(ray) for a in range(3)])
         pair = np.flatnonzero((t >= rays.t_min.take(ray)) & (t <= t_far.take(ray)) & (np.abs(t) < np.inf))
-        pair = pair[self._inside(*self._sheared(rays, ray[pair]), item[pair])]
+        own_ray, own = ray[pair], item[pair]
+        inside = np.zeros(len(pair), bool)
+        open_ = np.arange(len(pair))
+        if self._bands:
+            large = np.flatnonzero(np.diff(self.corners.start)[own] > MANY)
+            inside[large], doubtful = self._bands.inside(o[:, own_ray[large]], d[:, own_ray[large]], t[pair[large]], own[large])
+            open_ = np.concatenate([np.flatnonzero(np.diff(self.corners.start)[own] <= MANY), large[doubtful]])
+        inside[open_] = self._inside(*self._sheared(rays, own_ray[open_]), own[open_])
+        pair = pair[inside]
         return pair, t[pair]
 
     @staticmethod
@@ -206,3 +220,74 @@ class Polygons:
                     cut = cut[self._inside(axes, point[cut].T[axes, np.arange(len(cut))], zero, zero, item[cut])]
                     low[cut], high[cut] = np.minimum(low[cut], point[cut]), np.maximum(high[cut], point[cut])
         return low, high
+
+
+class Bands:
+    """Edges of large polygons, sorted by height into bands of equal height.
+
+    Positions and heights are the two coordinates of the polygon's ``axes``.
+
+    Attributes
+    ----------
+    first, number : ndarray, shape (n,)
+        A polygon's first band, and how many it has.
+    start : ndarray
+        Where a band's edges begin in `edges`.
+    edges : ndarray
+        Edges by their first corner.
+    """
+
+    #: Edges reach this far into the next bands, relative to the polygon's height.
+    MARGIN = 1e-9
+
+    def __init__(self, polygons):
+        self.polygons, corners = polygons, polygons.corners
+        count = np.diff(corners.start)
+        self.number = np.where(count > MANY, count // 2, 0)
+        self.first = np.concatenate([[0], np.cumsum(self.number)[:-1]])
+        edge = np.flatnonzero(np.repeat(count > MANY, count))
+        owner = np.repeat(np.arange(polygons.n), count)[edge]
+        axis = polygons.axes[1][owner]
+        ends = corners.xyz[axis, edge], corners.xyz[axis, corners.following[edge]]
+        low, high = (self._band(owner, f(*ends), side) for f, side in ((np.minimum, -1.0), (np.maximum, 1.0)))
+        times = high - low + 1
+        self.edges = np.repeat(edge, times)
+        offset = np.arange(len(self.edges)) - np.repeat(np.cumsum(times) - times, times)
+        band = np.repeat(self.first[owner] + low, times) + offset
+        order = np.argsort(band, kind="stable")
+        self.edges = self.edges[order]
+        self.start = np.searchsorted(band[order], np.arange(self.number.sum() + 1))
+
+    def _band(self, item, height, side=0.0):
+        """Number of the band at a height, within the polygon."""
+        i, axis = item, self.polygons.axes[1][item]
+        low, size = self.polygons.lo[i, axis], (self.polygons.hi - self.polygons.lo)[i, axis]
+        share = (height - low) / np.where(size > 0.0, size, 1.0) + side * self.MARGIN
+        return np.clip((share * self.number[i]).astype(np.int64), 0, self.number[i] - 1)
+
+    def inside(self, o, d, t, item):
+        """Whether rays pass through polygons: (ndarray of bool, indices of those too near to an edge to be sure)."""
+        p, corners = self.polygons, self.polygons.corners
+        i = np.arange(len(item))
+        a, b = p.axes[:, item]
+        x, y = o[a, i] + t * d[a, i], o[b, i] + t * d[b, i]
+        size = np.abs(o).max(axis=0) + np.abs(t) * np.abs(d).max(axis=0) + np.abs(corners.anchor[:, item]).max(axis=0)
+        slope = np.abs(d).max(axis=0) / np.abs(dot(corners.normal[:, item], d))
+        reach = 64 * EPSILON * size * (1.0 + slope)
+        doubtful = ~(reach < 0.5 * self.MARGIN * (p.hi - p.lo)[item, b])
+        band = self.first[item] + self._band(item, np.where(doubtful, 0.0, y))
+        first, count = self.start[band], self.start[band + 1] - self.start[band]
+        line = np.repeat(i, count)
+        edge = self.edges[np.arange(len(line)) - np.repeat(np.cumsum(count) - count, count) + np.repeat(first, count)]
+        following = corners.following[edge]
+        flat, total = corners.xyz.ravel(), corners.xyz.shape[1]
+        at_a, at_b, x, y, reach = a[line] * total, b[line] * total, x[line], y[line], reach[line]
+        x0, y0 = flat[at_a + edge] - x, flat[at_b + edge] - y
+        x1, y1 = flat[at_a + following] - x, flat[at_b + following] - y
+        side = x0 * y1 - x1 * y0
+        crosses = ((y0 > 0.0) != (y1 > 0.0)) & ((side > 0.0) == (y1 > 0.0))
+        near = ((np.abs(side) <= reach * (np.abs(x1 - x0) + np.abs(y1 - y0)))
+                & (np.minimum(x0, x1) <= reach) & (np.maximum(x0, x1) >= -reach)
+                & (np.minimum(y0, y1) <= reach) & (np.maximum(y0, y1) >= -reach))
+        doubtful |= np.bincount(line[near], minlength=len(item)) > 0
+        return np.bincount(line[crosses], minlength=len(item)) % 2 == 1, np.flatnonzero(doubtful)
