@@ -8,6 +8,8 @@ from .errors import Notice, ParameterError
 REFERENCES_AT_LEAST = 10_000
 #: ... or this many a primitive, whichever is larger: primitives that overlap cannot be told apart by any division.
 REFERENCES_PER_PRIMITIVE = 64
+#: Positions along a cell that the sweep of a kd-tree tells apart.
+POSITIONS = 2**32
 #: Part of a cell's edge (of a grid), or of the root's longest edge (of a tree), by which cells overlap, so that a walk off
 #: by rounding errors meets every primitive all the same.
 GRID_OVERLAP, TREE_OVERLAP = 2.0**-20, 2.0**-30
@@ -80,3 +82,8 @@ def check_storage(storage, walk, split):
     if storage != "pointers" and (walk != "root" or split != "centre"):
         raise ParameterError(f"octree: storage = {storage} keeps no pointers and no planes, so it goes with walk = root and split = centre "
                              f"only, not with walk = {walk}, split = {split}.")
+
+
+def depth_for(n):
+    """Levels that a kd-tree or BSP tree of n primitives may have, where none are asked for (Havran 2001)."""
+    return int(8 + 1.3 * math.log2(max(n, 1)))

@@ -28,6 +28,7 @@ class Cells:
     item : ndarray
     more : tuple of ndarray
         What else a tree keeps for each reference.
+    level : ndarray, shape (m,)
     """
 
     lo: np.ndarray
@@ -35,12 +36,17 @@ class Cells:
     count: np.ndarray
     item: np.ndarray
     more: tuple = ()
+    level: np.ndarray = None
+
+    def __post_init__(self):
+        if self.level is None:
+            self.level = np.zeros(len(self.count), np.int64)
 
     def take(self, index):
         """Some of the cells."""
         first = np.cumsum(self.count) - self.count
         refs = ranges(first[index], self.count[index])
-        return Cells(self.lo[index], self.hi[index], self.count[index], self.item[refs], tuple(a[refs] for a in self.more))
+        return Cells(self.lo[index], self.hi[index], self.count[index], self.item[refs], tuple(a[refs] for a in self.more), self.level[index])
 
     @property
     def cell(self):
@@ -130,6 +136,7 @@ class _Growth:
             wanted = np.flatnonzero(cells.count > self.leaf_size) if level < self.max_depth else np.zeros(0, np.int64)
             some = cells.take(wanted)
             plane, children, cost = self.divide(some)
+            children.level[:] = level + 1
             good = np.isfinite(plane).any(axis=0)
             misses = bad[wanted]
             if by_cost:
@@ -187,7 +194,9 @@ class _Growth:
                 # Its division depends on itself alone, so the next cells of the queue are divided along with it.
                 batch = [cell, *(c for _, c, _ in heapq.nsmallest(BATCH, queue) if c not in ready)]
                 some = [contents[c] for c in batch]
-                plane, children, _ = self.divide(joined(some))
+                together = joined(some)
+                plane, children, _ = self.divide(together)
+                children.level = np.repeat(together.level + 1, self.arity)
                 for k, c in enumerate(batch):
                     ready[c] = plane[:, k:k + 1], children.take(np.arange(k * self.arity, (k + 1) * self.arity))
             plane, children = ready.pop(cell)
@@ -234,4 +243,5 @@ BAD_AT_MOST = 3
 def joined(some):
     """Several Cells as one."""
     more = tuple(np.concatenate(c) for c in zip(*(s.more for s in some))) if some[0].more else ()
-    return Cells(*(np.concatenate([getattr(s, name) for s in some]) for name in ("lo", "hi", "count", "item")), more)
+    return Cells(*(np.concatenate([getattr(s, name) for s in some]) for name in ("lo", "hi", "count", "item")), more,
+                 np.concatenate([s.level for s in some]))

@@ -34,6 +34,8 @@ class CellTree(Structure):
     """
 
     ARITY = 2
+    #: Bytes of a cell that a subclass adds.
+    MORE_BYTES = 0
 
     def lay_out(self):
         """The root: the box around everything, larger by the margin; a flat one gets depth on one side."""
@@ -47,9 +49,9 @@ class CellTree(Structure):
 
     def grow(self, root, progress, stop, max_depth, leaf_size, max_bytes, walk, lists):
         """Grow the tree and measure it."""
-        links = 24 * (walk == "links")
+        more = self.MORE_BYTES + 24 * (walk == "links")
         self.tree = t = growth.grow(self.divide, root, self.ARITY, self.primitives.n, stop, max_depth, leaf_size, max_bytes,
-                                    NODE_BYTES + links, REFERENCE_BYTES, progress, self.NAME, self.notices)
+                                    NODE_BYTES + more, REFERENCE_BYTES, progress, self.NAME, self.notices)
         self.lists = Lists(np.repeat(np.arange(t.n), t.count), t.item, t.n, lists == "shared")
         del t.item, t.count
         self.links = self.linked() if walk == "links" else None
@@ -191,7 +193,11 @@ class Walk:
         return t_out, face
 
     def octants(self, cell, ray, t):
-        """In which octant of their cells rays are at t."""
+        """In which octant of their cells rays are at t; of cells divided along one axis: in which half (0, 1)."""
+        if self.structure.ARITY == 2:
+            axis = self.structure.axis.take(cell)
+            place = ray + axis * self.n
+            return (self.crossing(self.tree.plane.ravel().take(axis * self.tree.n + cell), place) <= t) ^ self.negative.take(place)
         k = 0
         for axis in range(3):
             place = ray + axis * self.n
