@@ -136,13 +136,13 @@ def test_random_numbers_are_uniform_and_unrelated():
 
 def test_techniques_do_not_change_the_picture():
     scene = everything()
-    want = trace(scene, "brute", size=(20, 15), samples=2)
+    want = trace(scene, "brute", size=(10, 8), depth=3)
     tried = 0
     for row in techniques():
         # Peers know triangles only; a technique not in this core, or for some rays only, has its own tests.
         if row.primitives != "all" or "fast" not in row.cores or len(row.rays) < 3:
             continue
-        got = trace(scene, row.name, size=(20, 15), samples=2)
+        got = trace(scene, row.name, size=(10, 8), depth=3)
         tried += 1
         for name in want.passes:
             np.testing.assert_allclose(got.passes[name], want.passes[name], rtol=1e-5, atol=1e-5, err_msg=f"{row.name}: {name}")

@@ -252,6 +252,20 @@ def test_alpha_goes_straight_on_and_is_no_bounce(core):
 
 
 @CORES
+def test_alpha_at_a_vertex_at_the_origin(core):
+    """All coordinates, and so the error bound, are 0 there; the ray must get away from it all the same."""
+    veil = Material("veil", ambient=0.0, diffuse=0.0, alpha=0.5)
+    sheet = Object("veil", Mesh([(0, 0, 0), (1, 0, 0), (0, 1, 0), (-1, 0, 0), (0, -1, 0)],
+                                [(0, 1, 2), (0, 2, 3), (0, 3, 4), (0, 4, 1)]), materials=(veil,))
+    camera = eye((0, 0, 5), (0, 0, 0))
+    assert seen(core, [sheet, floor(glow(1.0), z=-1.0)], camera)[0] == pytest.approx(0.5)
+    sun = Light("sun", "sun", (1, 1, 1), direction=(0, 0, -1))
+    below = eye((0, 0, -0.5), (0, 0, -1))
+    free, shaded = (seen(core, objects, below, [sun])[0] for objects in ([floor(LAMBERT, -1.0)], [sheet, floor(LAMBERT, -1.0)]))
+    assert shaded == pytest.approx(0.5 * free)
+
+
+@CORES
 def test_alpha_respects_the_cameras_clipping(core):
     veil = Material("veil", ambient=0.0, diffuse=0.0, alpha=0.5)
     objects = [floor(veil, 1.0), floor(glow(1.0))]

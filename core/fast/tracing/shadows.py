@@ -41,10 +41,11 @@ def filtered(closest, surfaces, o, d, reach):
     while len(which):
         hits = closest(which, o, d, left)
         met = np.flatnonzero(hits.primitive >= 0)
-        which, d, left = which[met], d[:, met], left[met] - hits.t[met]
+        which, d, left, before = which[met], d[:, met], left[met] - hits.t[met], o[:, met]
         surface = surfaces.at(hits, met, d)
         colour[:, which] *= passed(surfaces.table, surface, d)
-        on = np.flatnonzero((colour[:, which] > 0.0).any(axis=0) & (left > 0.0))
-        o = pushed(surface.point[:, on], surface.error[on], surface.normal[:, on], d[:, on])
-        which, d, left = which[on], d[:, on], left[on]
+        o = pushed(surface.point, surface.error, surface.normal, d)
+        # A ray that gets no further would go on for ever.
+        on = np.flatnonzero((colour[:, which] > 0.0).any(axis=0) & (left > 0.0) & (o != before).any(axis=0))
+        which, o, d, left = which[on], o[:, on], d[:, on], left[on]
     return colour

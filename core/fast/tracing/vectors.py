@@ -3,6 +3,10 @@
 import numpy as np
 
 
+#: Moves nothing but zeros.
+TINY = 1e-300
+
+
 def dot(a, b):
     """Dot products, shape (n,)."""
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
@@ -27,14 +31,15 @@ def pushed(point, error, normal, direction):
     """Origins for rays that leave surfaces along `direction`.
 
     Each point is moved along the geometric normal, to the side the ray goes, until it is clear of the box of its
-    rounding error, and rounded away from the surface (Pharr et al., PBR 4th ed., 6.8.6). No constant is involved.
+    rounding error, and rounded away from the surface (Pharr et al., PBR 4th ed., 6.8.6). TINY only serves a point that
+    is exactly 0 and has no error.
 
     Parameters
     ----------
     point, normal, direction : ndarray, shape (3, n)
     error : ndarray, shape (n,)
     """
-    reach = error * (np.abs(normal[0]) + np.abs(normal[1]) + np.abs(normal[2]))
+    reach = np.maximum(error, TINY) * (np.abs(normal[0]) + np.abs(normal[1]) + np.abs(normal[2]))
     offset = np.where(dot(direction, normal) < 0.0, -reach, reach) * normal
     moved = point + offset
     return np.where(offset == 0.0, moved, np.nextafter(moved, np.copysign(np.inf, offset)))

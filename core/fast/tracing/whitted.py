@@ -267,8 +267,11 @@ class Whitted:
         """Rays from surfaces, those with no weight left out."""
         weight = wave.weight[:, met] * weight
         which = np.flatnonzero((weight > 0.0).any(axis=0) & (t_max >= 0.0))
-        ray, direction = met[which], direction[:, which]
-        return Wave(pushed(surface.point[:, which], surface.error[which], surface.normal[:, which], direction),
-                    direction, t_max[which], weight[:, which], wave.pixel[ray],
+        o = pushed(surface.point[:, which], surface.error[which], surface.normal[:, which], direction[:, which])
+        # A ray that gets no further would go on for ever.
+        moved = np.flatnonzero((o != wave.o[:, met[which]]).any(axis=0))
+        which, o = which[moved], o[:, moved]
+        ray = met[which]
+        return Wave(o, direction[:, which], t_max[which], weight[:, which], wave.pixel[ray],
                     wave.depth[ray] + (kind != TRANSPARENT), np.full(len(ray), kind, np.uint8),
                     None if wave.key is None else sampling.branch(wave.key[ray], kind))

@@ -44,5 +44,7 @@ def filtered(closest, surfaces, o, d, reach):
         colour = mul(colour, passed(surface, d))
         if not max(colour) > 0.0:
             break
-        o, reach = pushed(surface.point, surface.error, surface.normal, d), reach - hit.t
+        before, o, reach = o, pushed(surface.point, surface.error, surface.normal, d), reach - hit.t
+        if o == before:
+            break       # it would go on for ever
     return colour

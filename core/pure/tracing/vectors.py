@@ -3,6 +3,10 @@
 import math
 
 
+#: Moves nothing but zeros.
+TINY = 1e-300
+
+
 def dot(a, b):
     """Dot product."""
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
@@ -52,9 +56,10 @@ def pushed(point, error, normal, direction):
     """Origin for a ray that leaves a surface along `direction`.
 
     The point is moved along the geometric normal, to the side the ray goes, until it is clear of the box of its
-    rounding error, and rounded away from the surface (Pharr et al., PBR 4th ed., 6.8.6). No constant is involved.
+    rounding error, and rounded away from the surface (Pharr et al., PBR 4th ed., 6.8.6). TINY only serves a point that
+    is exactly 0 and has no error.
     """
-    reach = error * (abs(normal[0]) + abs(normal[1]) + abs(normal[2]))
+    reach = max(error, TINY) * (abs(normal[0]) + abs(normal[1]) + abs(normal[2]))
     if dot(direction, normal) < 0.0:
         reach = -reach
     return tuple(_rounded_away(p, reach * n) for p, n in zip(point, normal))

@@ -210,7 +210,8 @@ class Whitted:
     def _spawn(path, surface, kind, direction, share, t_max):
         """Yield a ray from a surface, unless it has no weight."""
         weight = mul(path.weight, share)
-        if max(weight) > 0.0 and t_max >= 0.0:
-            yield Path(pushed(surface.point, surface.error, surface.normal, direction), direction, 0.0, t_max, weight,
-                       path.depth + (kind != TRANSPARENT), kind,
+        o = pushed(surface.point, surface.error, surface.normal, direction)
+        # A ray that gets no further would go on for ever.
+        if max(weight) > 0.0 and t_max >= 0.0 and o != path.o:
+            yield Path(o, direction, 0.0, t_max, weight, path.depth + (kind != TRANSPARENT), kind,
                        None if path.key is None else sampling.branch(path.key, kind))
