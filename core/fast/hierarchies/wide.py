@@ -127,7 +127,8 @@ def _four(values):
 
 def traverse(tree, frame, rays, query):
     """Find the leaves that rays meet and hand their primitives to the query."""
-    sign = (rays.d < 0.0)
+    # By the sign bit: the reciprocal of -0.0 counts as negative, too.
+    sign = np.signbit(rays.d)
     octant = sign[0] + 2 * sign[1] + 4 * sign[2]
     for o in np.flatnonzero(np.bincount(octant, minlength=8)):
         _Octant(tree, frame, rays, query, np.flatnonzero(octant == o), int(o)).run()
@@ -250,6 +251,7 @@ class _Octant:
         ray, item = np.concatenate(self.leaf_ray), np.concatenate(self.leaf_item).astype(np.int64)
         self.leaf_ray, self.leaf_item, self.waiting = [], [], 0
         if self.query.counts:
+            self.query.counts.steps(self.index[ray])
             self.query.counts.elementary(self.index[ray])
         if self.tree.first is not None:
             first, count = self.tree.first[item], self.tree.count[item]
