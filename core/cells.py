@@ -5,7 +5,7 @@ import math
 from .errors import Notice, ParameterError
 
 #: Division stops when the leaves hold more references than this, ...
-REFERENCES_AT_LEAST = 10_000
+REFERENCES_AT_LEAST = 1_000
 #: ... or this many a primitive, whichever is larger: primitives that overlap cannot be told apart by any division.
 REFERENCES_PER_PRIMITIVE = 64
 #: Positions along a cell that the sweep of a kd-tree tells apart.
