@@ -79,6 +79,9 @@ STOPS = ("depth", "memory", "cost")
 STOP_HELP = "When cells are divided no more: by depth and number of primitives; when max_bytes are used; where it does not pay"
 MAX_BYTES = Parameter("max_bytes", 64e6, "With stop = memory: cells are divided until so much is used", low=1e3, high=1e12, unit="bytes")
 
+WALK = Parameter("walk", "depth-first", "Which of the nodes that wait a ray enters next: the nearest child; the nearest of all, from a heap",
+                 choices=("depth-first", "best-first"))
+
 TECHNIQUES = (
     Technique("brute", "Brute Force", "hierarchies", "brute", "Brute",
               "Whitted 1980", "Every ray is tested against every primitive"),
@@ -87,9 +90,13 @@ TECHNIQUES = (
               "A tree of axis-aligned boxes around the primitives",
               parameters=(
                   Parameter("builder", {"pure": "sah", "fast": "ploc"}, "How the tree is built",
-                            choices=("sah", "sweep", "median", "lbvh", "ploc"), only=(("sweep", "fast"), ("median", "fast"), ("lbvh", "fast"), ("ploc", "fast"))),
+                            choices=("incremental", "sah", "sweep", "median", "lbvh", "ploc")),
+                  Parameter("order", "sorted", "In which order the incremental builder inserts: as in the scene, along a space-filling curve, at random",
+                            choices=("scene", "sorted", "shuffled")),
+                  Parameter("seed", 0, "Of the random order", low=0, high=2**31 - 1),
                   Parameter("leaf_size", {"pure": 2, "fast": 1},
                             "A leaf holds at most this many primitives where it can be divided", low=1, high=1024),
+                  WALK,
               )),
     Technique("grid", "Uniform Grid", "subdivision", "grid", "Grid",
               "Fujimoto et al. 1986; Amanatides and Woo 1987",

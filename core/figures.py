@@ -16,6 +16,7 @@ FIGURES = {
     "depth": "levels below the root",
     "memory": "bytes of the structure",
     "c_SAH": "SAH cost, c_T = c_I = 1",
+    "c_GS": "volumes and primitives tested by a random ray that meets the root (Goldsmith and Salmon)",
     "T_B": "build time, s",
     "T_R": "time for the rays, s",
     "N_IT": "intersection tests ray x primitive, per ray",

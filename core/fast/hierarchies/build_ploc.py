@@ -27,7 +27,7 @@ def morton_keys(boxes):
     for axis in range(3):
         # lo + hi lies in [-2, 2]: one scale for all axes, so that cells of the curve are cubes.
         cell = ((boxes[axis] + boxes[axis + 3]) * np.float32(511.75) + np.float32(1023.5)).astype(np.int64)
-        code |= _spread(np.clip(cell, 0, 2047).astype(np.uint64)) << np.uint64(2 - axis)
+        code |= spread(np.clip(cell, 0, 2047).astype(np.uint64)) << np.uint64(2 - axis)
     bits = np.uint64(max(1, int(n - 1).bit_length()))
     # The index in the low bits makes a plain sort do the work of argsort, several times faster.
     key = code << bits | np.arange(n, dtype=np.uint64)
@@ -35,7 +35,7 @@ def morton_keys(boxes):
     return key, (key & ((np.uint64(1) << bits) - np.uint64(1))).astype(np.int64)
 
 
-def _spread(x):
+def spread(x):
     """Move bit i of 11-bit numbers to bit 3 i."""
     for shift, mask in ((16, 0x70000FF0000FF), (8, 0x700F00F00F00F), (4, 0x10C30C30C30C3), (2, 0x1249249249249)):
         x = (x | x << np.uint64(shift)) & np.uint64(mask)

@@ -13,7 +13,7 @@ def build(boxes, leaf_size, progress):
 def _divide(level, leaf_size):
     """Each node at the best of all positions, of all three axes."""
     k, n = len(level.size), len(level.which)
-    best_cost, best_rank = np.full(k, np.inf), np.zeros(k, np.int64)
+    best_cost, best_rank, best_uneven = np.full(k, np.inf), np.zeros(k, np.int64), np.full(k, n)
     best_order = np.zeros(n, np.int64)
     place = level.place()
     last = place == level.size[level.which] - 1
@@ -28,12 +28,17 @@ def _divide(level, leaf_size):
         at = np.flatnonzero(~last)
         cost[at] = left[at] * (place[at] + 1) + right[at + 1] * (level.size[level.which[at]] - place[at] - 1)
         least = np.minimum.reduceat(cost, level.offset)
-        better = least < best_cost
-        # The first position of a node at which its least cost stands.
+        # Of the positions of a node at which its least cost stands the most even one: a thousand identical primitives
+        # are no chain of a thousand nodes.
         hit = np.flatnonzero(cost == least[level.which])
+        uneven = np.full(n, n)
+        uneven[hit] = np.abs(2 * (place[hit] + 1) - level.size[level.which[hit]])
+        least_uneven = np.minimum.reduceat(uneven, level.offset)
+        hit = hit[uneven[hit] == least_uneven[level.which[hit]]]
         first = np.zeros(k, np.int64)
         first[level.which[hit][::-1]] = place[hit][::-1]
-        best_cost[better], best_rank[better] = least[better], first[better]
+        better = (least < best_cost) | ((least == best_cost) & (least_uneven < best_uneven))
+        best_cost[better], best_rank[better], best_uneven[better] = least[better], first[better], least_uneven[better]
         best_order = np.where(better[level.which], rank, best_order)
     return best_order > best_rank[level.which], topdown.worth_dividing(level, best_cost, leaf_size)
 

@@ -1,27 +1,57 @@
-"""Bounding volume hierarchy: a binary tree of axis-aligned boxes by one of several builders, packed four-wide."""
+"""Bounding volume hierarchy: a tree of axis-aligned boxes by one of several builders.
+
+A binary tree that is walked depth first is packed four-wide, in single precision. All else is walked in lock step, in
+double precision, and counts what the pure core counts.
+"""
 
 from importlib import import_module
 
-from ..structure import Structure
 from . import wide
+from .order import order_of
 from .tree import Frame
+from .volume_tree import VolumeStructure, VolumeTree
 
 
-class BVH(Structure):
-    """The tree (``tree``), its frame, and the packed form that rays walk (``wide``)."""
+class BVH(VolumeStructure):
+    """The tree and, where it is packed, its frame and the packed form that rays walk (``wide``)."""
 
-    def build(self, progress, builder, leaf_size):
+    wide = None
+
+    def build(self, progress, builder, order, seed, leaf_size, walk):
         p = self.primitives
+        make = import_module(f".build_{builder}", __package__).build
+        if builder == "incremental":
+            self.complete(make(p, order_of(p, order, seed), progress))
+            return
         self.frame = Frame.around(p.lo, p.hi)
         boxes = self.frame.boxes(p.lo, p.hi)
-        make = import_module(f".build_{builder}", __package__).build
         self.tree = make(boxes, progress) if builder == "ploc" else make(boxes, leaf_size, progress)
+        if walk == "best-first":
+            self.complete(VolumeTree.of_binary(self.tree))
+        else:
+            self._pack()
+
+    def _pack(self):
         self.wide = wide.WideTree(self.tree)
         self.figures.update(self.tree.figures())
         self.figures["memory"] = self.tree.nbytes + self.wide.nbytes
 
     def traverse(self, rays, query):
-        wide.traverse(self.wide, self.frame, rays, query)
+        if self.wide is None:
+            super().traverse(rays, query)
+        else:
+            wide.traverse(self.wide, self.frame, rays, query)
+
+    def refit_volumes(self):
+        if self.wide is None:
+            super().refit_volumes()
+            return
+        p = self.primitives
+        self.frame = Frame.around(p.lo, p.hi)
+        self.tree.refit(self.frame.boxes(p.lo, p.hi))
+        self._pack()
 
     def cells(self):
-        return self.tree.cells(self.frame) if self.primitives.n else super().cells()
+        if self.wide is None:
+            return super().cells()
+        return self.tree.cells(self.frame)

@@ -90,14 +90,30 @@ class BinaryTree:
     def nbytes(self):
         return sum(a.nbytes for a in (self.boxes, self.left, self.right, self.first, self.count, self.order))
 
+    def refit(self, boxes):
+        """Fit the nodes to other boxes (6, n) of the same primitives."""
+        leaf = np.flatnonzero(self.left < 0)
+        first, count = self.first[leaf], self.count[leaf]
+        ends = np.cumsum(count)
+        place = np.repeat(first - (ends - count), count) + np.arange(ends[-1])
+        own = boxes[:, self.order[place]]
+        self.boxes[:3, leaf] = np.minimum.reduceat(own[:3], ends - count, axis=1)
+        self.boxes[3:, leaf] = np.maximum.reduceat(own[3:], ends - count, axis=1)
+        for level in reversed(self.levels()):
+            inner = level[self.left[level] >= 0]
+            a, b = self.left[inner], self.right[inner]
+            self.boxes[:3, inner] = np.minimum(self.boxes[:3, a], self.boxes[:3, b])
+            self.boxes[3:, inner] = np.maximum(self.boxes[3:, a], self.boxes[3:, b])
+
     def figures(self):
-        """N_G, N_E, N_EE, N_ER, depth and c_SAH."""
+        """N_G, N_E, N_EE, N_ER, depth, c_SAH and c_GS."""
         area = half_area(self.boxes.astype(float))
         leaf = self.left < 0
         root = float(area[self.root])
         cost = float(area[~leaf].sum() + (area[leaf] * self.count[leaf]).sum())
         return {"N_G": int((~leaf).sum()), "N_E": int(leaf.sum()), "N_EE": 0, "N_ER": int(self.count[leaf].sum()),
-                "depth": len(self.levels()) - 1, "c_SAH": cost / root if root > 0 else 0.0}
+                "depth": len(self.levels()) - 1, "c_SAH": cost / root if root > 0 else 0.0,
+                "c_GS": (cost + float(area[~leaf].sum())) / root if root > 0 else 0.0}
 
     def cells(self, frame):
         """The nodes as :class:`~rayscope.core.hits.Cells`, parents before children."""

@@ -1,0 +1,44 @@
+"""The axis-aligned box."""
+
+from . import Volume, slack_of
+
+
+class Aabb(Volume):
+    """A box with its faces along the axes.
+
+    Attributes
+    ----------
+    lo, hi : tuple of 3 float
+    """
+
+    JOINS = True
+    __slots__ = ("lo", "hi")
+
+    def __init__(self, lo, hi):
+        self.lo, self.hi = lo, hi
+
+    @classmethod
+    def around(cls, primitives):
+        slack = max(map(slack_of, primitives))
+        return cls(tuple(min(p.lo[axis] for p in primitives) - slack for axis in range(3)),
+                   tuple(max(p.hi[axis] for p in primitives) + slack for axis in range(3)))
+
+    @classmethod
+    def joined(cls, volumes):
+        """The box around boxes."""
+        return cls(tuple(map(min, *(v.lo for v in volumes), volumes[0].lo)), tuple(map(max, *(v.hi for v in volumes), volumes[0].hi)))
+
+    def enter(self, ray, t_far):
+        return ray.through_box(self.lo, self.hi, t_far)
+
+    def area(self):
+        return box_area(self.lo, self.hi)
+
+    def box(self):
+        return self.lo, self.hi
+
+
+def box_area(lo, hi):
+    """Surface area of a box."""
+    x, y, z = (h - l for l, h in zip(lo, hi))
+    return 2.0 * (x * y + y * z + z * x)
