@@ -136,7 +136,8 @@ def from_bmesh(name, build, smooth=False):
 
 
 def ball(name, segments=48):
-    return from_bmesh(name, lambda b: bmesh.ops.create_uvsphere(b, u_segments=segments, v_segments=segments // 2, radius=1.0), smooth=True)
+    return from_bmesh(name, lambda b: bmesh.ops.create_uvsphere(b, u_segments=segments, v_segments=segments // 2,
+                                                                radius=1.0), smooth=True)
 
 
 def boxes(name, *corners):
@@ -162,9 +163,13 @@ def lathe(name, profile, segments=48):
     """A surface of revolution about z from points (radius, height), from the bottom up."""
     angle = np.arange(segments) * 2 * math.pi / segments
     vertices = [(r * math.cos(a), r * math.sin(a), z) for r, z in profile for a in angle]
-    faces = [(i * segments + j, i * segments + (j + 1) % segments, (i + 1) * segments + (j + 1) % segments, (i + 1) * segments + j)
-             for i in range(len(profile) - 1) for j in range(segments)]
-    return from_arrays(name, vertices, faces, smooth=True)
+    return from_arrays(name, vertices, bands(len(profile), segments), smooth=True)
+
+
+def bands(rings, n):
+    """Quads between rings of n vertices each, facing out where the rings rise counter-clockwise."""
+    return [(i * n + j, i * n + (j + 1) % n, (i + 1) * n + (j + 1) % n, (i + 1) * n + j)
+            for i in range(rings - 1) for j in range(n)]
 
 
 def planks(width=256, height=256, seed=2, boards=8):
@@ -199,7 +204,8 @@ def still_life():
     wall = material("Plaster", (0.62, 0.55, 0.46), 1.0)
     place(boxes("Wall", ((-7, 3.4, 0), (7, 3.6, 5.5))), "Wall", materials=[wall])
 
-    mirror, frame = material("Mirror", (0.93, 0.94, 0.95), 0.0, metallic=1.0), material("Dark wood", (0.12, 0.05, 0.025), 0.4)
+    mirror = material("Mirror", (0.93, 0.94, 0.95), 0.0, metallic=1.0)
+    frame = material("Dark wood", (0.12, 0.05, 0.025), 0.4)
     lean = (math.radians(7), 0, math.radians(-6))
     place(boxes("Mirror", ((-1.9, 0, 0.1), (1.9, 0.05, 2.9))), "Mirror", (-0.3, 2.55, 0), lean, materials=[mirror])
     place(boxes("Mirror frame", ((-2.05, -0.04, 0), (-1.9, 0.1, 3.05)), ((1.9, -0.04, 0), (2.05, 0.1, 3.05)),
@@ -218,15 +224,19 @@ def still_life():
           materials=[material("Chrome", (0.9, 0.9, 0.92), 0.0, metallic=1.0)])
     place(ball("Gold ball", 32), "Gold ball", (-1.75, -0.35, 0.36), scale=(0.36,) * 3,
           materials=[material("Gold", (1.0, 0.72, 0.26), 0.12, metallic=1.0)])
-    place(lathe("Vase", [(0, 0), (0.3, 0), (0.42, 0.15), (0.5, 0.45), (0.42, 0.85), (0.22, 1.15), (0.2, 1.3), (0.3, 1.45), (0.27, 1.45),
+    place(lathe("Vase", [(0, 0), (0.3, 0), (0.42, 0.15), (0.5, 0.45), (0.42, 0.85), (0.22, 1.15), (0.2, 1.3),
+                         (0.3, 1.45), (0.27, 1.45),
                          (0.17, 1.3), (0.19, 1.15), (0.38, 0.85), (0.46, 0.45), (0.38, 0.15), (0, 0.08)]),
           "Vase", (-1.95, 1.05, 0), scale=(1.15,) * 3, materials=[material("Blue glaze", (0.03, 0.13, 0.42), 0.08)])
-    place(from_bmesh("Die", lambda b: bmesh.ops.create_icosphere(b, subdivisions=1, radius=0.27)), "Gem", (0.25, -1.25, 0.22), (0.1, 0, 0.5),
+    place(from_bmesh("Die", lambda b: bmesh.ops.create_icosphere(b, subdivisions=1, radius=0.27)), "Gem",
+          (0.25, -1.25, 0.22), (0.1, 0, 0.5),
           materials=[material("Emerald", (0.25, 0.95, 0.5), 0.0, transmission_weight=1.0, ior=1.57)])
 
-    lamp("AREA", "Window", (-3.6, -2.6, 4.2), (0, 0.4, 0.5), 260, (1.0, 0.95, 0.88), shape="RECTANGLE", size=1.6, size_y=1.0)
+    lamp("AREA", "Window", (-3.6, -2.6, 4.2), (0, 0.4, 0.5), 260, (1.0, 0.95, 0.88), shape="RECTANGLE", size=1.6,
+         size_y=1.0)
     lamp("POINT", "Candle", (-2.9, 0.2, 1.5), energy=35, colour=(1.0, 0.55, 0.25), shadow_soft_size=0.05)
-    lamp("SPOT", "Spot", (3.9, -1.2, 4.2), (1.2, 0.1, 0.3), 420, (0.85, 0.92, 1.0), spot_size=math.radians(42), spot_blend=0.35,
+    lamp("SPOT", "Spot", (3.9, -1.2, 4.2), (1.2, 0.1, 0.3), 420, (0.85, 0.92, 1.0), spot_size=math.radians(42),
+         spot_blend=0.35,
          shadow_soft_size=0.08)
     lamp("SUN", "Daylight", (0, 0, 6), (1.2, 1.8, 0), 0.45, (0.75, 0.85, 1.0), angle=math.radians(2))
     camera((0.55, -5.6, 2.35), (-0.05, 0.35, 0.85), 38)
@@ -243,7 +253,8 @@ def conifer(rng, tiers=16, height=7.0):
         slots.extend([slot] * len(polygons))
 
     ring = [(math.cos(a), math.sin(a)) for a in np.arange(7) * 2 * math.pi / 7]
-    add([(0.16 * x, 0.16 * y, 0.0) for x, y in ring] + [(0, 0, height * 0.97)], [(i, (i + 1) % 7, 7) for i in range(7)], 0)
+    add([(0.16 * x, 0.16 * y, 0.0) for x, y in ring] + [(0, 0, height * 0.97)],
+        [(i, (i + 1) % 7, 7) for i in range(7)], 0)
     for tier in range(tiers):
         at = tier / (tiers - 1)
         z, reach = height * (0.14 + 0.83 * at), 1.75 * (1 - at) ** 0.85 + 0.12
@@ -276,7 +287,8 @@ def broadleaf(rng, height=6.0, leaves=1500):
         other = np.cross(axis, side)
         base = len(vertices)
         for centre, radius in ((a, thick), (b, thin)):
-            vertices.extend(centre + radius * (math.cos(t) * side + math.sin(t) * other) for t in np.arange(5) * 2 * math.pi / 5)
+            ring = np.arange(5) * 2 * math.pi / 5
+            vertices.extend(centre + radius * (math.cos(t) * side + math.sin(t) * other) for t in ring)
         faces.extend((base + i, base + (i + 1) % 5, base + 5 + (i + 1) % 5, base + 5 + i) for i in range(5))
         slots.extend([0] * 5)
 
@@ -319,7 +331,8 @@ def plant(name, parts, materials, library):
 
 def hills(x, y):
     """Height of the ground; a valley along the view keeps the path low."""
-    return 1.4 * np.sin(x * 0.09 + 0.5) * np.cos(y * 0.07) + 0.35 * np.sin(x * 0.31) * np.sin(y * 0.27 + 1) + 0.012 * (np.abs(x) - 4).clip(0) ** 1.6
+    waves = 1.4 * np.sin(x * 0.09 + 0.5) * np.cos(y * 0.07) + 0.35 * np.sin(x * 0.31) * np.sin(y * 0.27 + 1)
+    return waves + 0.012 * (np.abs(x) - 4).clip(0) ** 1.6
 
 
 def forest():
@@ -338,7 +351,8 @@ def forest():
     side = np.linspace(-half, half, n + 1)
     x, y = (a.ravel() for a in np.meshgrid(side, side + half - 6, indexing="ij"))
     i = (np.arange(n)[:, None] * (n + 1) + np.arange(n)).ravel()
-    ground = from_arrays("Ground", np.stack([x, y, hills(x, y)], 1), np.stack([i, i + n + 1, i + n + 2, i + 1], 1), smooth=True)
+    ground = from_arrays("Ground", np.stack([x, y, hills(x, y)], 1), np.stack([i, i + n + 1, i + n + 2, i + 1], 1),
+                         smooth=True)
     place(ground, "Ground", materials=[material("Moss", (0.10, 0.15, 0.035), 1.0)])
 
     # Trees: throw darts, keep those that stand clear of the others and of the path.
@@ -346,9 +360,9 @@ def forest():
     while len(trees) < 560:
         p = np.array([rng.uniform(-half + 1, half - 1), rng.uniform(-3.5, 2 * half - 8)])
         clearing = 2.6 + 1.3 * math.sin(p[1] * 0.15) if p[1] < 45 else 1.0
-        if abs(p[0] - 2.5 * math.sin(p[1] * 0.09)) < clearing or any((p[0] - q[0]) ** 2 + (p[1] - q[1]) ** 2 < 3.2 for q in trees):
-            continue
-        trees.append(p)
+        on_path = abs(p[0] - 2.5 * math.sin(p[1] * 0.09)) < clearing
+        if not on_path and all(((p - q) ** 2).sum() >= 3.2 for q in trees):
+            trees.append(p)
     for k, (a, b) in enumerate(trees):
         kind = rng.choice(4, p=[0.42, 0.25, 0.2, 0.13])
         size = rng.uniform(0.75, 1.35)
@@ -368,7 +382,8 @@ def undergrowth(rng):
         for a in np.arange(9) * 2 * math.pi / 9:
             out, across = Vector((math.cos(a), math.sin(a), 0)), Vector((-math.sin(a), math.cos(a), 0))
             spine = [out * 0.16 * s + Vector((0, 0, 0.24 * s - 0.045 * s * s)) for s in range(5)]
-            edges = [(bm.verts.new(p + across * w), bm.verts.new(p - across * w)) for p, w in zip(spine, (0.015, 0.06, 0.07, 0.045, 0.004))]
+            edges = [(bm.verts.new(p + across * w), bm.verts.new(p - across * w)) for p,
+                     w in zip(spine, (0.015, 0.06, 0.07, 0.045, 0.004))]
             for (a1, b1), (a2, b2) in zip(edges, edges[1:]):
                 bm.faces.new((a1, b1, b2, a2))
 
@@ -384,8 +399,10 @@ def undergrowth(rng):
     points = bpy.data.meshes.new("Fern points")
     points.from_pydata(np.stack([x, y, hills(x, y)], 1).tolist(), [], [])
     points.attributes.new("turn", "FLOAT_VECTOR", "POINT").data.foreach_set(
-        "vector", np.stack([np.zeros(len(x)), np.zeros(len(x)), rng.uniform(0, 6.28, len(x))], 1).astype(np.float32).ravel())
-    points.attributes.new("size", "FLOAT", "POINT").data.foreach_set("value", rng.uniform(0.5, 1.3, len(x)).astype(np.float32))
+        "vector", np.stack([np.zeros(len(x)), np.zeros(len(x)), rng.uniform(0, 6.28, len(x))],
+                           1).astype(np.float32).ravel())
+    points.attributes.new("size", "FLOAT", "POINT").data.foreach_set("value",
+            rng.uniform(0.5, 1.3, len(x)).astype(np.float32))
 
     tree = bpy.data.node_groups.new("Scatter", "GeometryNodeTree")
     for way in ("INPUT", "OUTPUT"):
@@ -418,9 +435,12 @@ def teapot_in_a_stadium():
     pot = from_bmesh("Teapot", weld, smooth=True)
     bpy.data.meshes.remove(bpy.data.meshes["Patches"])
     table = 0.75
-    place(pot, "Teapot", (0, 0, table), (0, 0, math.radians(16)), (0.05,) * 3, materials=[material("Porcelain", (0.82, 0.84, 0.86), 0.08)])
-    place(lathe("Table", [(0, 0), (0.22, 0), (0.2, 0.03), (0.035, 0.06), (0.035, table - 0.03), (0.32, table - 0.03), (0.33, table - 0.015),
-                          (0.32, table), (0, table)], 40), "Table", materials=[material("Walnut", (0.2, 0.09, 0.04), 0.3)])
+    place(pot, "Teapot", (0, 0, table), (0, 0, math.radians(16)), (0.05,) * 3,
+          materials=[material("Porcelain", (0.82, 0.84, 0.86), 0.08)])
+    place(lathe("Table", [(0, 0), (0.22, 0), (0.2, 0.03), (0.035, 0.06), (0.035, table - 0.03), (0.32, table - 0.03),
+                          (0.33, table - 0.015),
+                          (0.32, table), (0, table)], 40), "Table", materials=[material("Walnut", (0.2, 0.09, 0.04),
+                                  0.3)])
 
     length, width = 52.5, 34.0
     grass = textured(material("Grass", roughness=1.0), "Grass", np.repeat(np.where((np.arange(64) < 32)[:, None, None],
@@ -429,8 +449,10 @@ def teapot_in_a_stadium():
     white = material("Chalk", (0.9, 0.9, 0.9), 1.0)
     circle = [(9.15 * math.cos(a), 9.15 * math.sin(a)) for a in np.arange(96) * 2 * math.pi / 96]
     ring = [(x * f, y * f, 0.0003) for f in (0.987, 1.0) for x, y in circle]
-    place(from_arrays("Centre circle", ring, [(i, i + 96, 96 + (i + 1) % 96, (i + 1) % 96) for i in range(96)]), "Centre circle", materials=[white])
-    place(boxes("Lines", ((-0.06, -width + 2, 0), (0.06, width - 2, 0.0003)), ((-length + 2, width - 2.12, 0), (length - 2, width - 2, 0.0003)),
+    place(from_arrays("Centre circle", ring, [(i, i + 96, 96 + (i + 1) % 96, (i + 1) % 96) for i in range(96)]),
+          "Centre circle", materials=[white])
+    place(boxes("Lines", ((-0.06, -width + 2, 0), (0.06, width - 2, 0.0003)),
+                ((-length + 2, width - 2.12, 0), (length - 2, width - 2, 0.0003)),
                 ((-length + 2, -width + 2, 0), (length - 2, -width + 2.12, 0.0003))), "Lines", materials=[white])
 
     # The stands: steps that rise around the pitch, every seventh row in another colour.
@@ -438,29 +460,29 @@ def teapot_in_a_stadium():
     angle = np.arange(segments) * 2 * math.pi / segments
     rim = np.stack([np.cos(angle), np.sin(angle)], 1)
     rim /= (np.abs(rim) ** 4).sum(axis=1, keepdims=True) ** 0.25          # an oval with nearly straight sides
-    profile = [(0.0, 0.0)] + [(0.85 * r + dr, 1.2 + 0.5 * (r + up)) for r in range(rows) for dr, up in ((0, 0), (0, 1))] + [(0.85 * rows + 6, 15.2)]
+    steps = [(0.85 * r, 1.2 + 0.5 * (r + up)) for r in range(rows) for up in (0, 1)]
+    profile = [(0.0, 0.0), *steps, (0.85 * rows + 6, 15.2)]
     stands = [(x * (length + 8 + out), y * (width + 8 + out), z) for out, z in profile for x, y in rim]
-    faces = [(i * segments + j, i * segments + (j + 1) % segments, (i + 1) * segments + (j + 1) % segments, (i + 1) * segments + j)
-             for i in range(len(profile) - 1) for j in range(segments)]
-    mesh = from_arrays("Stands", stands, faces)
-    for m in (material("Concrete", (0.38, 0.38, 0.4), 1.0), material("Seats", (0.10, 0.16, 0.45), 0.8), material("Red seats", (0.5, 0.07, 0.06), 0.8)):
+    mesh = from_arrays("Stands", stands, bands(len(profile), segments))
+    for m in (material("Concrete", (0.38, 0.38, 0.4), 1.0), material("Seats", (0.10, 0.16, 0.45), 0.8),
+              material("Red seats", (0.5, 0.07, 0.06), 0.8)):
         mesh.materials.append(m)
-    slot = np.array([(0 if i < 1 or i >= 2 * rows else 2 if (i // 2) % 7 == 3 else 1) if i % 2 else 0 for i in range(len(profile) - 1)
-                     for _ in range(segments)], np.int32)
-    mesh.polygons.foreach_set("material_index", slot)
+    colour = [0 if i % 2 == 0 or i >= 2 * rows else 2 if (i // 2) % 7 == 3 else 1 for i in range(len(profile) - 1)]
+    mesh.polygons.foreach_set("material_index", np.repeat(np.array(colour, np.int32), segments))
     place(mesh, "Stands")
     reach = 0.85 * rows + 6
-    roof = [(x * (length + 8 + out), y * (width + 8 + out), z) for out, z in ((reach, 15.2), (reach, 26.0), (9.0, 28.5)) for x, y in rim]
-    place(from_arrays("Roof", roof, [(i * segments + j, i * segments + (j + 1) % segments, (i + 1) * segments + (j + 1) % segments,
-                                      (i + 1) * segments + j) for i in range(2) for j in range(segments)]), "Roof",
-          materials=[material("Roof", (0.55, 0.57, 0.6), 0.9)])
+    over = ((reach, 15.2), (reach, 26.0), (9.0, 28.5))
+    roof = [(x * (length + 8 + out), y * (width + 8 + out), z) for out, z in over for x, y in rim]
+    place(from_arrays("Roof", roof, bands(3, segments)), "Roof", materials=[material("Roof", (0.55, 0.57, 0.6), 0.9)])
     place(plane("Apron", 220, 180), "Apron", (0, 0, -0.02), materials=[material("Track", (0.33, 0.12, 0.08), 1.0)])
 
     for k, (x, y) in enumerate(((-1, -1), (1, -1), (1, 1), (-1, 1))):
-        lamp("SPOT", f"Floodlight {k + 1}", (58 * x, 40 * y, 34), (0, 0, 0), 150_000 if k < 3 else 60_000, (1.0, 0.97, 0.9),
-             spot_size=math.radians(80), spot_blend=0.5, shadow_soft_size=0.3)
-    lamp("AREA", "Under the roof", (0, 48, 25), (0, 30, 0), 9_000, (0.8, 0.9, 1.0), shape="RECTANGLE", size=60, size_y=3)
-    lamp("AREA", "Under the other roof", (-60, 0, 25), (-30, 0, 0), 6_000, (0.8, 0.9, 1.0), shape="RECTANGLE", size=3, size_y=40)
+        lamp("SPOT", f"Floodlight {k + 1}", (58 * x, 40 * y, 34), (0, 0, 0), 150_000 if k < 3 else 60_000,
+             (1.0, 0.97, 0.9), spot_size=math.radians(80), spot_blend=0.5, shadow_soft_size=0.3)
+    lamp("AREA", "Under the roof", (0, 48, 25), (0, 30, 0), 9_000, (0.8, 0.9, 1.0), shape="RECTANGLE", size=60,
+         size_y=3)
+    lamp("AREA", "Under the other roof", (-60, 0, 25), (-30, 0, 0), 6_000, (0.8, 0.9, 1.0), shape="RECTANGLE", size=3,
+         size_y=40)
     camera((0.62, -0.86, 0.98), (-0.02, 0.2, 0.89), 31)
     bpy.context.scene.camera.data.clip_start, bpy.context.scene.camera.data.clip_end = 0.01, 500
 
@@ -468,7 +490,8 @@ def teapot_in_a_stadium():
 def chair(x, y, turn):
     legs = [((a - 0.02, b - 0.02, 0), (a + 0.02, b + 0.02, 0.44)) for a in (-0.19, 0.19) for b in (-0.19, 0.19)]
     back = [((a - 0.02, 0.17, 0.47), (a + 0.02, 0.21, 0.78)) for a in (-0.19, -0.065, 0.065, 0.19)]
-    mesh = bpy.data.meshes.get("Chair") or boxes("Chair", *legs, *back, ((-0.22, -0.22, 0.44), (0.22, 0.22, 0.47)), ((-0.22, 0.16, 0.78), (0.22, 0.22, 0.88)))
+    mesh = bpy.data.meshes.get("Chair") or boxes("Chair", *legs, *back, ((-0.22, -0.22, 0.44), (0.22, 0.22, 0.47)),
+                                                 ((-0.22, 0.16, 0.78), (0.22, 0.22, 0.88)))
     return place(mesh, "Chair", (x, y, 0), (0, 0, turn))
 
 
@@ -482,33 +505,41 @@ def interior():
     floor = textured(material("Floorboards", roughness=0.3), "Floorboards", planks(), 0.5)
     place(plane("Floor", 6.4, 8.2), "Floor", (0, 1.35, 0), materials=[floor])
     place(boxes("Ceiling", ((-3.2, -2.7, 2.7), (3.2, 5.4, 2.8))), "Ceiling", materials=[paint])
-    place(boxes("Outer walls", ((-3.2, -2.7, 0), (-3, 5.4, 2.7)), ((3, -2.7, 0), (3.2, -0.9, 2.7)), ((3, 0.9, 0), (3.2, 5.4, 2.7)),
-                ((3, -0.9, 0), (3.2, 0.9, 0.9)), ((3, -0.9, 2.2), (3.2, 0.9, 2.7)), ((-3, -2.7, 0), (3, -2.5, 2.7))), "Outer walls", materials=[paint])
+    place(boxes("Outer walls", ((-3.2, -2.7, 0), (-3, 5.4, 2.7)), ((3, -2.7, 0), (3.2, -0.9, 2.7)),
+                ((3, 0.9, 0), (3.2, 5.4, 2.7)), ((3, -0.9, 0), (3.2, 0.9, 0.9)), ((3, -0.9, 2.2), (3.2, 0.9, 2.7)),
+                ((-3, -2.7, 0), (3, -2.5, 2.7))), "Outer walls", materials=[paint])
     place(boxes("End wall", ((-3, 5.2, 0), (3, 5.4, 2.7))), "End wall", materials=[warm])
-    place(boxes("Wall with doorway", ((-3, 2.5, 0), (-0.15, 2.7, 2.7)), ((0.85, 2.5, 0), (3, 2.7, 2.7)), ((-0.15, 2.5, 2.05), (0.85, 2.7, 2.7))),
+    place(boxes("Wall with doorway", ((-3, 2.5, 0), (-0.15, 2.7, 2.7)), ((0.85, 2.5, 0), (3, 2.7, 2.7)),
+                ((-0.15, 2.5, 2.05), (0.85, 2.7, 2.7))),
           "Wall with doorway", materials=[paint])
-    place(boxes("Door frame", ((-0.21, 2.47, 0), (-0.13, 2.73, 2.11)), ((0.83, 2.47, 0), (0.91, 2.73, 2.11)), ((-0.13, 2.47, 2.03), (0.83, 2.73, 2.11))),
+    place(boxes("Door frame", ((-0.21, 2.47, 0), (-0.13, 2.73, 2.11)), ((0.83, 2.47, 0), (0.91, 2.73, 2.11)),
+                ((-0.13, 2.47, 2.03), (0.83, 2.73, 2.11))),
           "Door frame", materials=[dark])
-    place(boxes("Door", ((0, -0.025, 0.01), (0.94, 0.025, 2.02)), ((0.84, -0.06, 0.98), (0.9, 0.06, 1.04))), "Door", (-0.12, 2.74, 0),
-          (0, 0, math.radians(105)), materials=[oak])
-    place(boxes("Skirting", ((-3, 2.48, 0), (-0.21, 2.5, 0.09)), ((0.91, 2.48, 0), (3, 2.5, 0.09)), ((-3, -2.5, 0), (-2.98, 2.48, 0.09)),
+    place(boxes("Door", ((0, -0.025, 0.01), (0.94, 0.025, 2.02)), ((0.84, -0.06, 0.98), (0.9, 0.06, 1.04))), "Door",
+          (-0.12, 2.74, 0), (0, 0, math.radians(105)), materials=[oak])
+    place(boxes("Skirting", ((-3, 2.48, 0), (-0.21, 2.5, 0.09)), ((0.91, 2.48, 0), (3, 2.5, 0.09)),
+                ((-3, -2.5, 0), (-2.98, 2.48, 0.09)),
                 ((2.98, -2.5, 0), (3, 2.48, 0.09))), "Skirting", materials=[dark])
     place(boxes("Window frame", *(((3.02, y - 0.03, 0.9), (3.1, y + 0.03, 2.2)) for y in (-0.87, 0, 0.87)),
-                ((3.02, -0.9, 0.9), (3.1, 0.9, 0.96)), ((3.02, -0.9, 2.14), (3.1, 0.9, 2.2))), "Window frame", materials=[paint])
+                ((3.02, -0.9, 0.9), (3.1, 0.9, 0.96)), ((3.02, -0.9, 2.14), (3.1, 0.9, 2.2))),
+          "Window frame", materials=[paint])
 
-    place(boxes("Table", ((-0.7, -0.45, 0.71), (0.7, 0.45, 0.75)), *(((a - 0.03, b - 0.03, 0), (a + 0.03, b + 0.03, 0.71))
+    place(boxes("Table", ((-0.7, -0.45, 0.71), (0.7, 0.45, 0.75)),
+                *(((a - 0.03, b - 0.03, 0), (a + 0.03, b + 0.03, 0.71))
                 for a in (-0.62, 0.62) for b in (-0.37, 0.37))), "Table", (1.35, 0.35, 0), (0, 0, 0.1), materials=[oak])
     first = chair(1.1, -0.35, math.pi + 0.2)
     first.data.materials.append(dark)
     chair(1.75, -0.3, math.pi - 0.15), chair(1.0, 1.05, 0.1), chair(1.8, 1.1, -0.1)
-    place(lathe("Bowl", [(0, 0), (0.09, 0), (0.17, 0.05), (0.22, 0.12), (0.21, 0.12), (0.16, 0.06), (0.085, 0.012), (0, 0.012)], 24), "Bowl", (1.2, 0.35, 0.75),
+    place(lathe("Bowl", [(0, 0), (0.09, 0), (0.17, 0.05), (0.22, 0.12), (0.21, 0.12), (0.16, 0.06), (0.085, 0.012),
+                         (0, 0.012)], 24), "Bowl", (1.2, 0.35, 0.75),
           materials=[material("Blue glaze", (0.04, 0.16, 0.42), 0.1)])
     rng = np.random.default_rng(4)
     fruit = ball("Fruit", 16)
     fruit.materials.append(material("Orange", (0.85, 0.32, 0.03), 0.4))
     for x, y, z in ((-0.06, 0.02, 0.075), (0.06, 0.045, 0.078), (0.01, -0.07, 0.076), (0.01, 0.0, 0.16)):
         place(fruit, "Orange", (1.2 + x, 0.35 + y, 0.75 + z), scale=(0.055,) * 3)
-    place(lathe("Carafe", [(0, 0), (0.06, 0), (0.07, 0.05), (0.06, 0.13), (0.025, 0.19), (0.03, 0.26), (0.026, 0.26), (0.02, 0.19), (0.055, 0.13), (0.065, 0.05),
+    place(lathe("Carafe", [(0, 0), (0.06, 0), (0.07, 0.05), (0.06, 0.13), (0.025, 0.19), (0.03, 0.26), (0.026, 0.26),
+                           (0.02, 0.19), (0.055, 0.13), (0.065, 0.05),
                            (0.055, 0.006), (0, 0.006)], 24), "Carafe", (1.62, 0.42, 0.75),
           materials=[material("Glass", (0.95, 1.0, 0.98), 0.0, transmission_weight=1.0, ior=1.5)])
 
@@ -521,41 +552,56 @@ def interior():
             y = lo
             while y < hi - 0.06 and not (rng.random() < 0.04):
                 thick, tall = rng.uniform(0.02, 0.055), rng.uniform(0.2, 0.33)
-                spines[rng.integers(4)].append(((-2.96, y, z), (-2.96 + rng.uniform(0.17, 0.24), y + thick - 0.002, z + tall)))
+                spines[rng.integers(4)].append(((-2.96, y, z),
+                                                (-2.96 + rng.uniform(0.17, 0.24), y + thick - 0.002, z + tall)))
                 y += thick
-    for k, (books, colour) in enumerate(zip(spines, ((0.45, 0.08, 0.06), (0.08, 0.17, 0.32), (0.55, 0.48, 0.34), (0.09, 0.22, 0.12)))):
+    for k, (books, colour) in enumerate(zip(spines, ((0.45, 0.08, 0.06), (0.08, 0.17, 0.32), (0.55, 0.48, 0.34),
+                                                     (0.09, 0.22, 0.12)))):
         place(boxes(f"Books {k + 1}", *books), f"Books {k + 1}", materials=[material(f"Books {k + 1}", colour, 0.8)])
 
     cloth = material("Green cloth", (0.10, 0.22, 0.17), 1.0)
-    place(boxes("Sofa", ((-0.95, -0.4, 0.12), (0.95, 0.4, 0.42)), ((-0.95, 0.2, 0.42), (0.95, 0.42, 0.85)), ((-1.1, -0.4, 0.12), (-0.92, 0.42, 0.62)),
-                ((0.92, -0.4, 0.12), (1.1, 0.42, 0.62)), ((-0.9, -0.38, 0.42), (-0.01, 0.2, 0.53)), ((0.01, -0.38, 0.42), (0.9, 0.2, 0.53))),
+    place(boxes("Sofa", ((-0.95, -0.4, 0.12), (0.95, 0.4, 0.42)), ((-0.95, 0.2, 0.42), (0.95, 0.42, 0.85)),
+                ((-1.1, -0.4, 0.12), (-0.92, 0.42, 0.62)),
+                ((0.92, -0.4, 0.12), (1.1, 0.42, 0.62)), ((-0.9, -0.38, 0.42),
+                                                          (-0.01, 0.2, 0.53)), ((0.01, -0.38, 0.42), (0.9, 0.2, 0.53))),
           "Sofa", (-1.55, 2.0, 0), materials=[cloth])
-    place(boxes("Sofa feet", *(((a, b, 0), (a + 0.06, b + 0.06, 0.12)) for a in (-1.0, 0.94) for b in (-0.34, 0.3))), "Sofa feet", (-1.55, 2.0, 0),
+    place(boxes("Sofa feet", *(((a, b, 0), (a + 0.06, b + 0.06, 0.12)) for a in (-1.0, 0.94) for b in (-0.34, 0.3))),
+          "Sofa feet", (-1.55, 2.0, 0),
           materials=[dark])
-    place(plane("Rug", 2.3, 1.5), "Rug", (-1.25, 0.55, 0.008), (0, 0, 0.05), materials=[material("Rug", (0.42, 0.10, 0.08), 1.0)])
-    place(boxes("Low table", ((-0.45, -0.28, 0.36), (0.45, 0.28, 0.39)), *(((a, b, 0), (a + 0.04, b + 0.04, 0.36)) for a in (-0.42, 0.38) for b in (-0.25, 0.21))),
+    place(plane("Rug", 2.3, 1.5), "Rug", (-1.25, 0.55, 0.008), (0, 0, 0.05),
+          materials=[material("Rug", (0.42, 0.10, 0.08), 1.0)])
+    place(boxes("Low table", ((-0.45, -0.28, 0.36), (0.45, 0.28, 0.39)),
+                *(((a, b, 0), (a + 0.04, b + 0.04, 0.36)) for a in (-0.42, 0.38) for b in (-0.25, 0.21))),
           "Low table", (-1.4, 0.6, 0.008), materials=[dark])
-    place(boxes("Mirror", ((1.35, 2.455, 1.05), (2.45, 2.47, 1.95))), "Mirror", materials=[material("Mirror", (0.92, 0.93, 0.94), 0.0, metallic=1.0)])
-    place(boxes("Mirror frame", ((1.28, 2.44, 0.98), (1.35, 2.49, 2.02)), ((2.45, 2.44, 0.98), (2.52, 2.49, 2.02)), ((1.35, 2.44, 0.98), (2.45, 2.49, 1.05)),
+    place(boxes("Mirror", ((1.35, 2.455, 1.05), (2.45, 2.47, 1.95))), "Mirror",
+          materials=[material("Mirror", (0.92, 0.93, 0.94), 0.0, metallic=1.0)])
+    place(boxes("Mirror frame", ((1.28, 2.44, 0.98), (1.35, 2.49, 2.02)), ((2.45, 2.44, 0.98), (2.52, 2.49, 2.02)),
+                ((1.35, 2.44, 0.98), (2.45, 2.49, 1.05)),
                 ((1.35, 2.44, 1.95), (2.45, 2.49, 2.02))), "Mirror frame", materials=[metal])
-    place(boxes("Picture", ((-2.15, 2.46, 1.2), (-0.95, 2.48, 1.95))), "Picture", materials=[material("Canvas", (0.72, 0.62, 0.25), 0.9)])
-    place(boxes("Picture detail", ((-2.05, 2.452, 1.3), (-1.5, 2.462, 1.6)), ((-1.4, 2.452, 1.45), (-1.05, 2.462, 1.85))), "Picture detail",
+    place(boxes("Picture", ((-2.15, 2.46, 1.2), (-0.95, 2.48, 1.95))), "Picture",
+          materials=[material("Canvas", (0.72, 0.62, 0.25), 0.9)])
+    place(boxes("Picture detail", ((-2.05, 2.452, 1.3), (-1.5, 2.462, 1.6)),
+                ((-1.4, 2.452, 1.45), (-1.05, 2.462, 1.85))), "Picture detail",
           materials=[material("Paint", (0.12, 0.25, 0.40), 0.9)])
-    place(boxes("Hall bench", ((-0.2, 4.75, 0.4), (1.1, 5.1, 0.46)), ((-0.15, 4.8, 0), (-0.08, 5.05, 0.4)), ((0.98, 4.8, 0), (1.05, 5.05, 0.4))), "Hall bench",
+    place(boxes("Hall bench", ((-0.2, 4.75, 0.4), (1.1, 5.1, 0.46)), ((-0.15, 4.8, 0), (-0.08, 5.05, 0.4)),
+                ((0.98, 4.8, 0), (1.05, 5.05, 0.4))), "Hall bench",
           materials=[dark])
 
-    # Eight lamps: four spots in the ceiling, a pendant, a floor lamp, two in the hall. None but theirs can light the hall.
+    # Eight lamps: four spots in the ceiling, a pendant, a floor lamp, two in the hall. None but theirs can light the
+    # hall.
     shade = lathe("Shade", [(0.20, 0), (0.09, 0.2)], 20)
     shade.materials.append(material("Linen", (0.85, 0.78, 0.62), 1.0))
     place(shade, "Pendant shade", (1.35, 0.35, 1.62))
     place(boxes("Pendant cord", ((1.345, 0.345, 1.8), (1.355, 0.355, 2.7))), "Pendant cord", materials=[dark])
-    lamp("POINT", "Pendant", (1.35, 0.35, 1.66), energy=26, colour=(1.0, 0.8, 0.55), shadow_soft_size=0.04)
+    lamp("POINT", "Pendant", (1.35, 0.35, 1.66), energy=36, colour=(1.0, 0.8, 0.55), shadow_soft_size=0.008)
     place(shade, "Floor lamp shade", (-2.6, 1.95, 1.4))
-    place(boxes("Floor lamp", ((-2.615, 1.935, 0), (-2.585, 1.965, 1.45)), ((-2.75, 1.8, 0), (-2.45, 2.1, 0.02))), "Floor lamp", materials=[metal])
-    lamp("POINT", "Floor lamp", (-2.6, 1.95, 1.5), energy=22, colour=(1.0, 0.72, 0.42), shadow_soft_size=0.04)
+    place(boxes("Floor lamp", ((-2.615, 1.935, 0), (-2.585, 1.965, 1.45)), ((-2.75, 1.8, 0), (-2.45, 2.1, 0.02))),
+          "Floor lamp", materials=[metal])
+    lamp("POINT", "Floor lamp", (-2.6, 1.95, 1.5), energy=30, colour=(1.0, 0.72, 0.42), shadow_soft_size=0.008)
     for k, (x, y) in enumerate(((-1.9, -1.3), (-1.9, 1.4), (0.6, -1.3), (0.35, 1.9))):
-        lamp("SPOT", f"Ceiling {k + 1}", (x, y, 2.66), (x, y, 0), 55, (1.0, 0.9, 0.75), spot_size=math.radians(95), spot_blend=0.6, shadow_soft_size=0.03)
-    lamp("POINT", "Hall", (0.9, 4.2, 2.4), energy=42, colour=(1.0, 0.85, 0.65), shadow_soft_size=0.06)
+        lamp("SPOT", f"Ceiling {k + 1}", (x, y, 2.66), (x, y, 0), 75, (1.0, 0.9, 0.75), spot_size=math.radians(95),
+             spot_blend=0.6, shadow_soft_size=0.01)
+    lamp("POINT", "Hall", (0.9, 4.2, 2.4), energy=55, colour=(1.0, 0.85, 0.65), shadow_soft_size=0.02)
     lamp("AREA", "Hall skylight", (-1.6, 4.0, 2.65), (-1.6, 4.0, 0), 30, (0.75, 0.85, 1.0), shape="SQUARE", size=0.8)
     camera((-0.75, -2.3, 1.55), (0.25, 1.6, 1.12), 20)
     bpy.context.scene.camera.data.clip_start = 0.01

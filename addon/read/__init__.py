@@ -35,5 +35,11 @@ def read_scene(depsgraph, *, for_render=True, camera=None, size=None):
     """
     notices = Notices()
     objects, lights = read_objects(depsgraph, for_render, notices)
-    return Scene(objects=objects, lights=lights, camera=read_camera(depsgraph, camera, size, notices),
-                 world=read_world(depsgraph.scene_eval.world, notices), name=depsgraph.scene.name, notices=notices.all)
+    return Scene(
+        objects=objects,
+        lights=lights,
+        camera=read_camera(depsgraph, camera, size, notices),
+        world=read_world(depsgraph.scene_eval.world, notices),
+        name=depsgraph.scene.name,
+        notices=notices.all,
+    )

@@ -23,10 +23,13 @@ def read_image(image, notices, interpolation="linear", extension="repeat"):
     Image or None
         None, with a notice, where there are no pixels: the file is missing or no picture.
     """
-    width, height = image.size                                            # reads the file
+    width, height = image.size  # reads the file
     if not image.has_data or not width or not height:
-        notices.add(image.name, f"the image has no pixels: {image.filepath or 'its file'} is missing or cannot be read. "
-                    "Use File > External Data > Find Missing Files.")
+        notices.add(
+            image.name,
+            f"the image has no pixels: {image.filepath or 'its file'} is missing or cannot be read. "
+            "Use File > External Data > Find Missing Files.",
+        )
         return None
     if image.source in {"MOVIE", "SEQUENCE", "TILED"}:
         notices.add(image.name, f"of an image of type {image.source.lower()} only the first picture is used.")

@@ -24,12 +24,16 @@ def read_light(obj, matrix, notices):
     Light
     """
     lamp = obj.data
-    power = np.array(lamp.color[:]) * lamp.energy * 2.0 ** lamp.exposure * _shader(lamp, notices)
+    power = np.array(lamp.color[:]) * lamp.energy * 2.0**lamp.exposure * _shader(lamp, notices)
     if lamp.use_temperature:
         power = power * np.array(lamp.temperature_color[:])
     back = matrix[:3, 2]
     direction = -back / (np.linalg.norm(back) or 1.0)
-    common = {"position": tuple(matrix[:3, 3].tolist()), "direction": tuple(direction.tolist()), "shadows": lamp.use_shadow}
+    common = {
+        "position": tuple(matrix[:3, 3].tolist()),
+        "direction": tuple(direction.tolist()),
+        "shadows": lamp.use_shadow,
+    }
     if lamp.type == "AREA":
         return _area(obj.name, lamp, matrix, power, common, notices)
     if lamp.type == "SUN":
@@ -44,8 +48,15 @@ def read_light(obj, matrix, notices):
         # The sphere's surface then has the radiance P / pi, whatever its size; Cycles takes an area of 1 for a point.
         scale = radius * radius if radius > 0.0 else 1.0 / math.pi
     if lamp.type == "SPOT":
-        return Light(obj.name, "spot", _triple(power * scale), radius=radius, spot_angle=lamp.spot_size,
-                     spot_blend=lamp.spot_blend, **common)
+        return Light(
+            obj.name,
+            "spot",
+            _triple(power * scale),
+            radius=radius,
+            spot_angle=lamp.spot_size,
+            spot_blend=lamp.spot_blend,
+            **common,
+        )
     return Light(obj.name, "point", _triple(power * scale), radius=radius, **common)
 
 
@@ -61,8 +72,14 @@ def _area(name, lamp, matrix, power, common, notices):
         notices.add(name, "an area light without area gives no light. Give it a size.")
     elif lamp.normalize:
         power = power / area
-    return Light(name, "area", _triple(power / math.pi if area > 0.0 else power * 0.0), axes=(_triple(u), _triple(v)),
-                 shape="ellipse" if round_ else "rectangle", **common)
+    return Light(
+        name,
+        "area",
+        _triple(power / math.pi if area > 0.0 else power * 0.0),
+        axes=(_triple(u), _triple(v)),
+        shape="ellipse" if round_ else "rectangle",
+        **common,
+    )
 
 
 def _shader(lamp, notices):

@@ -26,7 +26,7 @@ class Materials:
 
     def __init__(self, notices):
         self.notices = notices
-        self._read = {None: Read(Material("Default"))}                    # an empty slot: Blender's grey
+        self._read = {None: Read(Material("Default"))}  # an empty slot: Blender's grey
 
     def of(self, obj):
         """What an evaluated object's slots hold, as a tuple of :class:`Read`; at least one."""
@@ -53,8 +53,15 @@ def read_material(material, notices):
     Read
     """
     if not uses_nodes(material):
-        return Read(Material.principled(material.name, tuple(material.diffuse_color)[:3], material.metallic, material.roughness,
-                                        specular_level=material.specular_intensity))
+        return Read(
+            Material.principled(
+                material.name,
+                tuple(material.diffuse_color)[:3],
+                material.metallic,
+                material.roughness,
+                specular_level=material.specular_intensity,
+            )
+        )
     reader = Reader(material.name, notices)
     output = reader.output(material.node_tree)
     if output is None:
@@ -95,10 +102,18 @@ class Closure:
                 pixels[..., 3] = alpha.image.pixels[..., 0]
                 image, cut_out = replace(image, pixels=pixels), True
             else:
-                reader.lost(f"its alpha comes from another picture than its colour; the mean {alpha.number():.3g} was used")
-        material = replace(self.material, name=reader.name, base=tuple(base.factor[:3].tolist()), texture=image,
-                           vertex_colours=base.vertex, texture_alpha=cut_out,
-                           alpha=float(alpha.factor[0]) if cut_out else alpha.number())
+                reader.lost(
+                    f"its alpha comes from another picture than its colour; the mean {alpha.number():.3g} was used"
+                )
+        material = replace(
+            self.material,
+            name=reader.name,
+            base=tuple(base.factor[:3].tolist()),
+            texture=image,
+            vertex_colours=base.vertex,
+            texture_alpha=cut_out,
+            alpha=float(alpha.factor[0]) if cut_out else alpha.number(),
+        )
         return Read(material, base.uv_name, base.colour_name)
 
 
@@ -109,8 +124,13 @@ def _closure(reader, socket, groups):
         return Closure(_black(reader.name))
     read = SHADERS.get(node.type)
     if read is None:
-        reader.lost(f"the shader {node.name} ({node.bl_label}) cannot be traced; a grey diffuse surface was used instead")
-        return Closure(Material.principled(reader.name, (1.0, 1.0, 1.0), roughness=1.0, specular_level=0.0), Value.constant((0.8, 0.8, 0.8)))
+        reader.lost(
+            f"the shader {node.name} ({node.bl_label}) cannot be traced; a grey diffuse surface was used instead"
+        )
+        return Closure(
+            Material.principled(reader.name, (1.0, 1.0, 1.0), roughness=1.0, specular_level=0.0),
+            Value.constant((0.8, 0.8, 0.8)),
+        )
     normal = node.inputs.get("Normal")
     if normal is not None and reader.source(normal, groups)[0] is not None:
         reader.lost("its bump or normal map is not traced; the smooth normals were used")
@@ -127,20 +147,33 @@ def _principled(reader, node, groups):
     strength = number("Emission Strength")
     emission = reader.mean(node.inputs["Emission Color"], groups) * strength if strength else np.zeros(3)
     ior = number("IOR", 1.5)
-    material = Material.principled(reader.name, (1.0, 1.0, 1.0), min(1.0, max(0.0, number("Metallic"))), number("Roughness", 0.5),
-                                   ior if ior > 0.0 else 1.0, transmission=min(1.0, max(0.0, number("Transmission Weight"))),
-                                   specular_level=number("Specular IOR Level", 0.5), emission=emission.tolist())
-    return Closure(material, reader.value(node.inputs["Base Color"], groups), reader.value(node.inputs["Alpha"], groups))
+    material = Material.principled(
+        reader.name,
+        (1.0, 1.0, 1.0),
+        min(1.0, max(0.0, number("Metallic"))),
+        number("Roughness", 0.5),
+        ior if ior > 0.0 else 1.0,
+        transmission=min(1.0, max(0.0, number("Transmission Weight"))),
+        specular_level=number("Specular IOR Level", 0.5),
+        emission=emission.tolist(),
+    )
+    return Closure(
+        material, reader.value(node.inputs["Base Color"], groups), reader.value(node.inputs["Alpha"], groups)
+    )
 
 
 def _of_principled(colour="Color", **fixed):
     """A reader of a simple shader: the Principled BSDF with some inputs fixed and the others read."""
+
     def read(reader, node, groups):
         values = dict(fixed)
         for name, socket in (("roughness", "Roughness"), ("ior", "IOR")):
             if name not in values and socket in node.inputs:
                 values[name] = reader.number(node.inputs[socket], groups)
-        return Closure(Material.principled(reader.name, (1.0, 1.0, 1.0), **values), reader.value(node.inputs[colour], groups))
+        return Closure(
+            Material.principled(reader.name, (1.0, 1.0, 1.0), **values), reader.value(node.inputs[colour], groups)
+        )
+
     return read
 
 
@@ -157,7 +190,10 @@ def _emission(reader, node, groups):
 def _transparent(reader, node, groups):
     colour = reader.mean(node.inputs["Color"], groups)
     if np.ptp(colour) > 0.01:
-        reader.lost("transparency without refraction is not coloured; its brightness was used. Use glass with an index of refraction of 1")
+        reader.lost(
+            "transparency without refraction is not coloured; its brightness was used. "
+            "Use glass with an index of refraction of 1"
+        )
     return Closure(_black(reader.name), alpha=Value.constant(1.0 - min(1.0, Value.constant(colour).number())))
 
 
@@ -170,12 +206,15 @@ def _mix(reader, node, groups):
     factor = reader.value(node.inputs[0], groups)
     if not factor.varies:
         t = min(1.0, max(0.0, factor.number()))
-        if t in (0.0, 1.0):                                               # what is not seen gives no notices
+        if t in (0.0, 1.0):  # what is not seen gives no notices
             return _closure(reader, node.inputs[1 + int(t)], groups)
     a, b = (_closure(reader, s, groups) for s in (node.inputs[1], node.inputs[2]))
     if factor.varies:
-        for bare, other, share in ((a, b, factor), (b, a, pixelwise(lambda p: 1.0 - p[..., :3], [factor], reader.lost))):
-            if _is_clear(bare) and factor.image is not None:              # leaves cut out of a rectangle
+        for bare, other, share in (
+            (a, b, factor),
+            (b, a, pixelwise(lambda p: 1.0 - p[..., :3], [factor], reader.lost)),
+        ):
+            if _is_clear(bare) and factor.image is not None:  # leaves cut out of a rectangle
                 return replace(other, alpha=multiply(share, other.alpha, reader.lost))
         t = min(1.0, max(0.0, factor.number()))
         reader.lost(f"the factor of {node.name} varies over the surface; its mean {t:.3g} was used")
@@ -195,7 +234,9 @@ def _combined(reader, a, b, share_a, share_b):
     """Two shaders, each with a share: coefficients add up, the base colours are averaged by what they colour."""
     for c in (a, b):
         if c.alpha.varies:
-            reader.lost(f"an alpha that varies inside a mix of shaders is not traced; its mean {c.alpha.number():.3g} was used")
+            reader.lost(
+                f"an alpha that varies inside a mix of shaders is not traced; its mean {c.alpha.number():.3g} was used"
+            )
     alphas = np.array([a.alpha.number(), b.alpha.number()])
     clear = min(1.0, float(np.array([share_a, share_b]) @ (1.0 - alphas)))
     weights = np.array([share_a, share_b]) * alphas
@@ -227,7 +268,7 @@ def _average(reader, a, b, weights):
     t = weights[1] / weights.sum()
     if not (a.varies or b.varies):
         return Value.constant(a.factor[:3] * (1.0 - t) + b.factor[:3] * t)
-    if a.image is b.image and a.vertex == b.vertex:                       # the same picture in both
+    if a.image is b.image and a.vertex == b.vertex:  # the same picture in both
         return replace(a, factor=a.factor * (1.0 - t) + b.factor * t)
     return pixelwise(lambda p, q: p[..., :3] * (1.0 - t) + q[..., :3] * t, [a, b], reader.lost)
 

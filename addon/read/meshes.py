@@ -37,22 +37,24 @@ def read_mesh(mesh):
     corners, faces = _triangles(mesh)
     corner_vertices = _attribute(mesh, ".corner_vert", "value", np.int32)
     triangles = corner_vertices[corners] if len(corners) else np.zeros((0, 3), np.int32)
-    slots = _attribute(mesh, "material_index", "value", np.int32)        # absent when all are 0
+    slots = _attribute(mesh, "material_index", "value", np.int32)  # absent when all are 0
     normals = None
-    if mesh.normals_domain != "FACE":                                     # flat shading needs the geometric normals only
+    if mesh.normals_domain != "FACE":  # flat shading needs the geometric normals only
         normals = _values(mesh.corner_normals, "vector", np.float32, 3)[corners]
-    return Mesh(vertices, triangles, slots=None if slots is None else slots[faces], corner_normals=normals, name=mesh.name), corners
+    return Mesh(
+        vertices, triangles, slots=None if slots is None else slots[faces], corner_normals=normals, name=mesh.name
+    ), corners
 
 
 def read_corner_uvs(mesh, name=None):
-    """Texture coordinates of every corner, shape (C, 2): of the layer named, else of the one used in renders; or None."""
+    """Texture coordinates of every corner, (C, 2): of the layer named, else of the one used in renders; or None."""
     layers = mesh.uv_layers
     layer = layers.get(name) if name else next((l for l in layers if l.active_render), layers.active)
     return None if layer is None or not len(layer.uv) else _values(layer.uv, "vector", np.float32, 2)
 
 
 def read_corner_colours(mesh, name=None):
-    """Linear RGBA of every corner, shape (C, 4): of the colour attribute named, else of the one used in renders; or None."""
+    """Linear RGBA of every corner, (C, 4): of the attribute named, else of the one used in renders; or None."""
     attributes = mesh.color_attributes
     index = attributes.render_color_index
     if name:
@@ -61,7 +63,7 @@ def read_corner_colours(mesh, name=None):
         attribute = attributes[index] if 0 <= index < len(attributes) else attributes.active_color
     if attribute is None or not len(attribute.data):
         return None
-    colours = _values(attribute.data, "color", np.float32, 4)             # linear, for byte colours too
+    colours = _values(attribute.data, "color", np.float32, 4)  # linear, for byte colours too
     return colours[_attribute(mesh, ".corner_vert", "value", np.int32)] if attribute.domain == "POINT" else colours
 
 
@@ -75,6 +77,6 @@ def _triangles(mesh):
     """The corners of every triangle, shape (T, 3), and the faces they belong to, shape (T,)."""
     mesh.calc_loop_triangles()
     faces = _values(mesh.loop_triangle_polygons, "value", np.int32)
-    if len(faces) == len(mesh.polygons):                                  # triangles only: they are the corners in order
+    if len(faces) == len(mesh.polygons):  # triangles only: they are the corners in order
         return np.arange(3 * len(faces), dtype=np.int32).reshape(-1, 3), faces
     return _values(mesh.loop_triangles, "loops", np.int32, 3), faces

@@ -74,7 +74,9 @@ class Reader:
             elif node.type == "REROUTE":
                 socket = node.inputs[0]
             elif node.type == "GROUP":
-                end = node.node_tree and next((n for n in node.node_tree.nodes if n.type == "GROUP_OUTPUT" and n.is_active_output), None)
+                end = node.node_tree and next(
+                    (n for n in node.node_tree.nodes if n.type == "GROUP_OUTPUT" and n.is_active_output), None
+                )
                 if not end:
                     return None, None, groups
                 socket, groups = _by_identifier(end.inputs, out.identifier), (*groups, node)
@@ -95,8 +97,10 @@ class Reader:
         found = read(self, node, end, groups) if read else None
         if found is None:
             found = Value.constant(_default(socket))
-            self.lost(f"the node {node.name} ({node.bl_label}) behind {socket.name} cannot be read; "
-                      f"{_words(found, socket)} was used instead")
+            self.lost(
+                f"the node {node.name} ({node.bl_label}) behind {socket.name} cannot be read; "
+                f"{_words(found, socket)} was used instead"
+            )
         return grey(found) if socket.type == "VALUE" and end.type == "RGBA" else found
 
     def number(self, socket, groups, default=0.0):
@@ -122,7 +126,7 @@ class Reader:
     # --- where a texture is looked up ---
 
     def place(self, socket, groups, what):
-        """The affine map (4 x 4) before a texture, and the node and output it starts from (None, None: nothing linked)."""
+        """The affine map (4 x 4) before a texture, and the node and output it starts from; None, None: nothing."""
         matrix = np.eye(4)
         for _ in range(MAX_STEPS):
             node, out, groups = self.source(socket, groups)
@@ -135,6 +139,7 @@ class Reader:
 
     def _mapping(self, node, groups):
         """The 4 x 4 matrix of a Mapping node."""
+
         def vector(name):
             socket = node.inputs.get(name)
             return np.zeros(3) if socket is None or not socket.enabled else self.vector(socket, groups)
@@ -170,7 +175,9 @@ class Reader:
             if start.type in {"UVMAP", "ATTRIBUTE"}:
                 uv_name = (start.uv_map if start.type == "UVMAP" else start.attribute_name) or None
             elif not (start.type == "TEX_COORD" and end.name == "UV"):
-                self.lost(f"{node.name}: coordinates from {start.bl_label} ({end.name}) are not traced; the UV map was used")
+                self.lost(
+                    f"{node.name}: coordinates from {start.bl_label} ({end.name}) are not traced; the UV map was used"
+                )
         if not np.array_equal(matrix, np.eye(4)):
             image = Image(image.name, image.pixels, image.interpolation, image.extension, matrix[:2][:, [0, 1, 3]])
         found = Value(image=image, uv_name=uv_name)
@@ -181,10 +188,17 @@ class Reader:
         if image is None:
             return None
         if node.projection != "EQUIRECTANGULAR":
-            self.lost(f"{node.name}: {node.projection.lower()} projection is not traced; the picture was taken as equirectangular")
+            self.lost(
+                f"{node.name}: {node.projection.lower()} projection is not traced; "
+                "the picture was taken as equirectangular"
+            )
         matrix, start, end = self.place(node.inputs["Vector"], groups, node.name)
-        if start is not None and not (start.type == "TEX_COORD" and end.name in {"Generated", "Object"} or start.type == "NEW_GEOMETRY"):
-            self.lost(f"{node.name}: coordinates from {start.bl_label} ({end.name}) are not traced; the direction was used")
+        if start is not None and not (
+            start.type == "TEX_COORD" and end.name in {"Generated", "Object"} or start.type == "NEW_GEOMETRY"
+        ):
+            self.lost(
+                f"{node.name}: coordinates from {start.bl_label} ({end.name}) are not traced; the direction was used"
+            )
         if matrix[:3, 3].any():
             self.lost(f"{node.name}: the location of its mapping is not traced; only rotation and scale are")
         self.rotation = matrix[:3, :3]
@@ -196,8 +210,12 @@ class Reader:
             return None
         key = node.image.as_pointer(), node.interpolation, extension
         if key not in self._images:
-            self._images[key] = read_image(node.image, self.notices, "closest" if node.interpolation == "Closest" else "linear",
-                                           extension or "repeat")
+            self._images[key] = read_image(
+                node.image,
+                self.notices,
+                "closest" if node.interpolation == "Closest" else "linear",
+                extension or "repeat",
+            )
         return self._images[key]
 
     def vertex_colour(self, node, out, groups):
@@ -223,7 +241,9 @@ class Reader:
             factor, a, b = node.inputs
             blend, clamp_factor, clamp = node.blend_type, True, node.use_clamp
         if blend not in BLENDS:
-            self.lost(f"{node.name}: the blending {blend.lower().replace('_', ' ')} is not traced; plain mixing was used")
+            self.lost(
+                f"{node.name}: the blending {blend.lower().replace('_', ' ')} is not traced; plain mixing was used"
+            )
             blend = "MIX"
         factor, a, b = (self.value(s, groups) for s in (factor, a, b))
         fixed = not factor.varies
@@ -246,23 +266,35 @@ class Reader:
 
     def gamma(self, node, out, groups):
         power = self.number(node.inputs["Gamma"], groups)
-        return pixelwise(lambda p: np.maximum(p[..., :3], 0.0) ** power, [self.value(node.inputs["Color"], groups)], self.lost)
+        return pixelwise(
+            lambda p: np.maximum(p[..., :3], 0.0) ** power, [self.value(node.inputs["Color"], groups)], self.lost
+        )
 
     def invert(self, node, out, groups):
         f = self.number(node.inputs["Fac"], groups)
-        return pixelwise(lambda p: p[..., :3] * (1.0 - f) + (1.0 - p[..., :3]) * f, [self.value(node.inputs["Color"], groups)], self.lost)
+        return pixelwise(
+            lambda p: p[..., :3] * (1.0 - f) + (1.0 - p[..., :3]) * f,
+            [self.value(node.inputs["Color"], groups)],
+            self.lost,
+        )
 
     def bright_contrast(self, node, out, groups):
         bright, contrast = (self.number(node.inputs[n], groups) for n in ("Bright", "Contrast"))
-        return pixelwise(lambda p: np.maximum((1.0 + contrast) * p[..., :3] + bright - 0.5 * contrast, 0.0),
-                         [self.value(node.inputs["Color"], groups)], self.lost)
+        return pixelwise(
+            lambda p: np.maximum((1.0 + contrast) * p[..., :3] + bright - 0.5 * contrast, 0.0),
+            [self.value(node.inputs["Color"], groups)],
+            self.lost,
+        )
 
     def colour_ramp(self, node, out, groups):
         if out.name != "Color":
             return None
         ramp = np.array([node.color_ramp.evaluate(i / 255.0)[:3] for i in range(256)], np.float32)
-        return pixelwise(lambda p: ramp[np.rint(np.clip(p[..., 0], 0.0, 1.0) * 255.0).astype(int)],
-                         [self.value(node.inputs["Fac"], groups)], self.lost)
+        return pixelwise(
+            lambda p: ramp[np.rint(np.clip(p[..., 0], 0.0, 1.0) * 255.0).astype(int)],
+            [self.value(node.inputs["Fac"], groups)],
+            self.lost,
+        )
 
     def math(self, node, out, groups):
         if node.operation not in MATH:
@@ -270,12 +302,17 @@ class Reader:
         values = [self.value(s, groups) for s in node.inputs if s.enabled]
         clip = (lambda x: np.clip(x, 0.0, 1.0)) if node.use_clamp else (lambda x: x)
         with np.errstate(all="ignore"):
-            return pixelwise(lambda *p: np.nan_to_num(clip(MATH[node.operation](*(q[..., :3] for q in p)))), values, self.lost)
+            return pixelwise(
+                lambda *p: np.nan_to_num(clip(MATH[node.operation](*(q[..., :3] for q in p)))), values, self.lost
+            )
 
     def fresnel(self, node, out, groups):
         ior = max(1e-3, self.number(node.inputs["IOR"], groups))
         value = ((ior - 1.0) / (ior + 1.0)) ** 2
-        self.lost(f"{node.name}: the change with the angle is not traced; the value {value:.3g}, seen from straight above, was used")
+        self.lost(
+            f"{node.name}: the change with the angle is not traced; the value seen from straight above, "
+            f"{value:.3g}, was used"
+        )
         return Value.constant(value)
 
     def camera_ray(self, node, out, groups):
@@ -288,17 +325,31 @@ class Reader:
         if out.name != "Color":
             return None
         value = 0.5 * (self.mean(node.inputs["Color1"], groups) + self.mean(node.inputs["Color2"], groups))
-        self.lost(f"{node.name}: the pattern {node.bl_label} is not traced; the mean {_rgb(value)} of its colours was used. "
-                  "Bake it into an image")
+        self.lost(
+            f"{node.name}: the pattern {node.bl_label} is not traced; the mean {_rgb(value)} of its colours was used. "
+            "Bake it into an image"
+        )
         return Value.constant(value)
 
 
 #: Node type -> method giving its Value, or None where it cannot be read.
 NODES = {
-    "TEX_IMAGE": Reader.image_texture, "TEX_ENVIRONMENT": Reader.environment_texture, "VERTEX_COLOR": Reader.vertex_colour,
-    "ATTRIBUTE": Reader.attribute, "RGB": Reader.own_output, "VALUE": Reader.own_output, "MIX": Reader.mix, "MIX_RGB": Reader.mix,
-    "GAMMA": Reader.gamma, "INVERT": Reader.invert, "BRIGHTCONTRAST": Reader.bright_contrast, "VALTORGB": Reader.colour_ramp,
-    "MATH": Reader.math, "FRESNEL": Reader.fresnel, "LIGHT_PATH": Reader.camera_ray, "TEX_CHECKER": Reader.two_colours,
+    "TEX_IMAGE": Reader.image_texture,
+    "TEX_ENVIRONMENT": Reader.environment_texture,
+    "VERTEX_COLOR": Reader.vertex_colour,
+    "ATTRIBUTE": Reader.attribute,
+    "RGB": Reader.own_output,
+    "VALUE": Reader.own_output,
+    "MIX": Reader.mix,
+    "MIX_RGB": Reader.mix,
+    "GAMMA": Reader.gamma,
+    "INVERT": Reader.invert,
+    "BRIGHTCONTRAST": Reader.bright_contrast,
+    "VALTORGB": Reader.colour_ramp,
+    "MATH": Reader.math,
+    "FRESNEL": Reader.fresnel,
+    "LIGHT_PATH": Reader.camera_ray,
+    "TEX_CHECKER": Reader.two_colours,
     "TEX_BRICK": Reader.two_colours,
 }
 
@@ -318,10 +369,18 @@ BLENDS = {
 }
 
 MATH = {
-    "ADD": lambda a, b: a + b, "SUBTRACT": lambda a, b: a - b, "MULTIPLY": lambda a, b: a * b,
-    "DIVIDE": lambda a, b: a / b, "MULTIPLY_ADD": lambda a, b, c: a * b + c, "POWER": lambda a, b: a ** b,
-    "MINIMUM": np.minimum, "MAXIMUM": np.maximum, "ABSOLUTE": np.abs, "SQRT": np.sqrt,
-    "LESS_THAN": lambda a, b: (a < b) * 1.0, "GREATER_THAN": lambda a, b: (a > b) * 1.0,
+    "ADD": lambda a, b: a + b,
+    "SUBTRACT": lambda a, b: a - b,
+    "MULTIPLY": lambda a, b: a * b,
+    "DIVIDE": lambda a, b: a / b,
+    "MULTIPLY_ADD": lambda a, b, c: a * b + c,
+    "POWER": lambda a, b: a**b,
+    "MINIMUM": np.minimum,
+    "MAXIMUM": np.maximum,
+    "ABSOLUTE": np.abs,
+    "SQRT": np.sqrt,
+    "LESS_THAN": lambda a, b: (a < b) * 1.0,
+    "GREATER_THAN": lambda a, b: (a > b) * 1.0,
 }
 
 

@@ -12,7 +12,12 @@ from .materials import Materials
 from .meshes import read_corner_colours, read_corner_uvs, read_mesh
 
 #: Types that give no triangles, and what they are called.
-NOT_TRACED = {"VOLUME": "a volume", "CURVES": "hair curves", "POINTCLOUD": "a point cloud", "GREASEPENCIL": "a grease pencil drawing"}
+NOT_TRACED = {
+    "VOLUME": "a volume",
+    "CURVES": "hair curves",
+    "POINTCLOUD": "a point cloud",
+    "GREASEPENCIL": "a grease pencil drawing",
+}
 
 
 def read_objects(depsgraph, for_render, notices):
@@ -79,9 +84,17 @@ class Geometries:
             self._meshes[key] = read_mesh(obj.data)
         mesh, corners = self._meshes[key]
         if len(mesh):
-            self._add(obj, mesh, corners, "corner_uvs", read_corner_uvs, [m.uv_name for m in materials if m.material.texture])
-            self._add(obj, mesh, corners, "corner_colours", read_corner_colours,
-                      [m.colour_name for m in materials if m.material.vertex_colours])
+            self._add(
+                obj, mesh, corners, "corner_uvs", read_corner_uvs, [m.uv_name for m in materials if m.material.texture]
+            )
+            self._add(
+                obj,
+                mesh,
+                corners,
+                "corner_colours",
+                read_corner_colours,
+                [m.colour_name for m in materials if m.material.vertex_colours],
+            )
         return mesh
 
     def _add(self, obj, mesh, corners, field, read, wanted):
@@ -93,11 +106,17 @@ class Geometries:
         if values is not None:
             setattr(mesh, field, values[corners])
         elif field == "corner_uvs":
-            self.notices.add(obj.name, f"it has no UV map{f' named {name}' if name else ''}, but its material has a texture; "
-                             "its first pixel is used. Unwrap the mesh.")
+            self.notices.add(
+                obj.name,
+                f"it has no UV map{f' named {name}' if name else ''}, but its material has a texture; "
+                "its first pixel is used. Unwrap the mesh.",
+            )
         else:
-            self.notices.add(obj.name, f"it has no colour attribute{f' named {name}' if name else ''}, but its material asks for one; "
-                             "white was used.")
+            self.notices.add(
+                obj.name,
+                f"it has no colour attribute{f' named {name}' if name else ''}, but its material asks for one; "
+                "white was used.",
+            )
         if len(set(wanted)) > 1:
             self.notices.add(obj.name, f"its materials look up several layers; one alone is read: {name}.")
 
@@ -119,7 +138,10 @@ def _hidden_in_renders(instance, hidden):
 def _note_flags(obj, notices):
     """What an object asks for that is not traced."""
     if obj.type == "MESH" and not obj.visible_camera:
-        notices.add(obj.name, "it is to be invisible to the camera, which is not traced: it is seen. Hide it in renders instead.")
+        notices.add(
+            obj.name,
+            "it is to be invisible to the camera, which is not traced: it is seen. Hide it in renders instead.",
+        )
     if obj.is_holdout:
         notices.add(obj.name, "a holdout is not traced; it is seen like any other object.")
     if any(p.settings.type == "HAIR" and p.settings.render_type == "PATH" for p in obj.particle_systems):
@@ -129,12 +151,21 @@ def _note_flags(obj, notices):
 def _note_missing(depsgraph, hidden, notices):
     """Name what a render would show but the viewport's depsgraph does not hold."""
     layer = depsgraph.view_layer
-    missing = [o.name for o in layer.objects if o.type in {"MESH", "LIGHT", "CURVE", "FONT", "SURFACE", "META"} and not o.hide_render
-               and o.name_full not in hidden and not o.visible_get(view_layer=layer)]
+    missing = [
+        o.name
+        for o in layer.objects
+        if o.type in {"MESH", "LIGHT", "CURVE", "FONT", "SURFACE", "META"}
+        and not o.hide_render
+        and o.name_full not in hidden
+        and not o.visible_get(view_layer=layer)
+    ]
     if missing:
         names = ", ".join(missing[:5]) + (" ..." if len(missing) > 5 else "")
-        notices.add(depsgraph.scene.name, f"hidden in the viewport and therefore not read, though shown in renders: {names}. "
-                    "Show them, or render with F12.")
+        notices.add(
+            depsgraph.scene.name,
+            f"hidden in the viewport and therefore not read, though shown in renders: {names}. "
+            "Show them, or render with F12.",
+        )
 
 
 def _hidden_collections(view_layer):

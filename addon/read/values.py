@@ -1,7 +1,7 @@
 """What a node socket carries over a surface: a constant, times a picture, times vertex colours.
 
-Nodes that compute with colours are carried out on the pixels of a picture, which then replaces it; so a picture mixed with
-a colour, brightened or put through a colour ramp is still one picture.
+Nodes that compute with colours are carried out on the pixels of a picture, which then replaces it; so a picture mixed
+with a colour, brightened or put through a colour ramp is still one picture.
 """
 
 from dataclasses import dataclass, field, replace
@@ -71,8 +71,13 @@ def multiply(a, b, lost):
     """a times b; exact as long as only one of them has a picture and one vertex colours."""
     if (a.image is None or b.image is None) and not (a.vertex and b.vertex):
         # The picture's own side lends its names; alpha is the first one's.
-        return Value(np.append(a.factor[:3] * b.factor[:3], a.factor[3]), a.image or b.image, a.uv_name or b.uv_name,
-                     a.vertex or b.vertex, a.colour_name or b.colour_name)
+        return Value(
+            np.append(a.factor[:3] * b.factor[:3], a.factor[3]),
+            a.image or b.image,
+            a.uv_name or b.uv_name,
+            a.vertex or b.vertex,
+            a.colour_name or b.colour_name,
+        )
     return pixelwise(lambda p, q: p[..., :3] * q[..., :3], [a, b], lost)
 
 
@@ -115,5 +120,7 @@ def pixelwise(function, values, lost=None):
 def _same_grid(a, b):
     """Whether two pictures lie pixel on pixel."""
     p, q = a.image, b.image
-    same_mapping = p.mapping is q.mapping or (p.mapping is not None and q.mapping is not None and np.allclose(p.mapping, q.mapping))
+    same_mapping = p.mapping is q.mapping or (
+        p.mapping is not None and q.mapping is not None and np.allclose(p.mapping, q.mapping)
+    )
     return p.pixels.shape == q.pixels.shape and p.extension == q.extension and a.uv_name == b.uv_name and same_mapping

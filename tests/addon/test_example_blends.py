@@ -1,4 +1,5 @@
 """The example files open, read without a complaint, and contain what they are for."""
+
 import subprocess
 import sys
 from pathlib import Path
@@ -26,7 +27,9 @@ def test_opens_and_reads_without_notices(name):
     assert bpy.context.scene.view_settings.view_transform == "Standard"
     assert (FOLDER / f"{name}.blend").stat().st_size < 1_000_000
     for image in bpy.data.images:
-        assert image.packed_file or image.source == "GENERATED" or not image.users, f"{image.name} lies outside the file"
+        assert image.packed_file or image.source == "GENERATED" or not image.users, (
+            f"{image.name} lies outside the file"
+        )
     assert not bpy.data.libraries and not bpy.data.texts
 
 
@@ -34,9 +37,14 @@ def test_still_life():
     scene = read("still_life")
     materials = scene.used_materials()
     assert sum(m.refracts for m in materials) == 2 and any(m.mirror_base == 1 for m in materials)
-    assert any(m.texture for m in materials) and {lamp.kind for lamp in scene.lights} == {"area", "point", "spot", "sun"}
+    assert any(m.texture for m in materials) and {lamp.kind for lamp in scene.lights} == {
+        "area",
+        "point",
+        "spot",
+        "sun",
+    }
     suzanne = next(o for o in scene.objects if o.name == "Suzanne")
-    assert len(suzanne.geometry) == 2 * (32 * 3 + 468 * 4) * 4            # 32 triangles and 468 quads, subdivided twice
+    assert len(suzanne.geometry) == 2 * (32 * 3 + 468 * 4) * 4  # 32 triangles and 468 quads, subdivided twice
     assert suzanne.geometry.corner_normals is not None
 
 
@@ -73,7 +81,9 @@ def test_the_script_makes_these_files(tmp_path):
     """Run again, in a process of its own, it gives the same scenes."""
     if not bpy.app.module or bpy.app.version >= (4, 6):
         pytest.skip("the script needs the bpy 4.5 module")
-    subprocess.run([sys.executable, FOLDER / "make_examples.py", tmp_path], check=True, stdout=subprocess.DEVNULL, timeout=120)
+    subprocess.run(
+        [sys.executable, FOLDER / "make_examples.py", tmp_path], check=True, stdout=subprocess.DEVNULL, timeout=120
+    )
     for name in NAMES:
         kept, made = read(name), read(name, tmp_path)
         assert [(o.name, len(o.geometry)) for o in kept.objects] == [(o.name, len(o.geometry)) for o in made.objects]

@@ -1,4 +1,5 @@
-"""Lamps light a white diffuse floor as brightly as Cycles says, within 2 %: by the documented units, and in our picture."""
+"""Lamps light a white diffuse floor as brightly as Cycles says, within 2 %: in the units documented and in our picture."""
+
 import math
 
 import bpy
@@ -10,7 +11,7 @@ from bl_ext.user_default.rayscope.core import trace
 
 
 def irradiance(light, point):
-    """Irradiance of an upward floor at a point, from the fields of a core Light alone: what its documentation promises."""
+    """Irradiance of an upward floor at a point, from the fields of a core Light: what its documentation says."""
     colour = np.array(light.colour)
     if light.kind == "sun":
         return colour * max(0.0, -light.direction[2])
@@ -82,7 +83,11 @@ def floor_and_camera(scene):
 
 CASES = {
     "point": ("POINT", {"energy": 50, "shadow_soft_size": 0.0}, {}),
-    "point with a radius": ("POINT", {"energy": 50, "shadow_soft_size": 0.2, "exposure": 1.5, "color": (1, 0.5, 0.2)}, {}),
+    "point with a radius": (
+        "POINT",
+        {"energy": 50, "shadow_soft_size": 0.2, "exposure": 1.5, "color": (1, 0.5, 0.2)},
+        {},
+    ),
     "point, not normalised": ("POINT", {"energy": 50, "shadow_soft_size": 0.2, "normalize": False}, {}),
     "point, not normalised, no radius": ("POINT", {"energy": 50, "shadow_soft_size": 0.0, "normalize": False}, {}),
     "point, warm": ("POINT", {"energy": 50, "use_temperature": True, "temperature": 3000.0}, {}),
@@ -91,17 +96,30 @@ CASES = {
     "wide sun": ("SUN", {"energy": 3, "angle": 0.5}, {}),
     "sun, not normalised": ("SUN", {"energy": 3, "angle": 0.5, "normalize": False}, {}),
     "spot": ("SPOT", {"energy": 50, "spot_size": 1.0, "spot_blend": 0.0, "shadow_soft_size": 0.0}, {}),
-    "spot, not normalised": ("SPOT", {"energy": 50, "spot_size": 1.4, "spot_blend": 0.2, "shadow_soft_size": 0.3, "normalize": False}, {}),
-    "spot, blended": ("SPOT", {"energy": 50, "spot_size": 0.6, "spot_blend": 0.7, "shadow_soft_size": 0.0},
-                      {"rotation_euler": (0.2, 0.3, 0.1)}),
-    "spot, scaled": ("SPOT", {"energy": 50, "spot_size": 0.9, "spot_blend": 0.7, "shadow_soft_size": 0.0},
-                     {"rotation_euler": (0.2, 0.3, 0.1), "scale": (2, 2, 2)}),
+    "spot, not normalised": (
+        "SPOT",
+        {"energy": 50, "spot_size": 1.4, "spot_blend": 0.2, "shadow_soft_size": 0.3, "normalize": False},
+        {},
+    ),
+    "spot, blended": (
+        "SPOT",
+        {"energy": 50, "spot_size": 0.6, "spot_blend": 0.7, "shadow_soft_size": 0.0},
+        {"rotation_euler": (0.2, 0.3, 0.1)},
+    ),
+    "spot, scaled": (
+        "SPOT",
+        {"energy": 50, "spot_size": 0.9, "spot_blend": 0.7, "shadow_soft_size": 0.0},
+        {"rotation_euler": (0.2, 0.3, 0.1), "scale": (2, 2, 2)},
+    ),
     "square": ("AREA", {"energy": 50, "shape": "SQUARE", "size": 2}, {}),
     "rectangle": ("AREA", {"energy": 50, "shape": "RECTANGLE", "size": 2, "size_y": 0.5}, {}),
     "disk": ("AREA", {"energy": 50, "shape": "DISK", "size": 1.5}, {}),
     "ellipse, scaled": ("AREA", {"energy": 50, "shape": "ELLIPSE", "size": 1.5, "size_y": 0.7}, {"scale": (0.5, 2, 1)}),
-    "rectangle, not normalised": ("AREA", {"energy": 50, "shape": "RECTANGLE", "size": 2, "size_y": 0.5, "normalize": False},
-                                  {"scale": (0.5, 1, 1)}),
+    "rectangle, not normalised": (
+        "AREA",
+        {"energy": 50, "shape": "RECTANGLE", "size": 2, "size_y": 0.5, "normalize": False},
+        {"scale": (0.5, 1, 1)},
+    ),
     "disk, not normalised": ("AREA", {"energy": 50, "shape": "DISK", "size": 1.5, "normalize": False}, {}),
 }
 
@@ -135,7 +153,7 @@ def compare(empty_scene, tmp_path, lamp, placing):
     empty_scene.collection.objects.link(obj)
     empty_scene.view_layers[0].update()
     scene = read_scene(bpy.context.evaluated_depsgraph_get())
-    light, = scene.lights
+    (light,) = scene.lights
     ours = irradiance(light, np.zeros(3)) / math.pi
     theirs = cycles_radiance(empty_scene, tmp_path)
     assert ours.max() > 1e-3 and ours == pytest.approx(theirs, rel=0.02)

@@ -1,4 +1,5 @@
 """Materials through their nodes; textures and vertex colours; what cannot be read is named with the value used."""
+
 import bpy
 import numpy as np
 import pytest
@@ -69,8 +70,17 @@ def same(a, b, ignore=("name", "base", "texture", "vertex_colours", "texture_alp
     return True
 
 
-GOLD = {"Base_Color": (1, 0.7, 0.2, 1), "Metallic": 0.9, "Roughness": 0.1, "IOR": 1.4, "Specular_IOR_Level": 0.3, "Alpha": 0.8,
-        "Transmission_Weight": 0.25, "Emission_Color": (1, 0.5, 0, 1), "Emission_Strength": 2}
+GOLD = {
+    "Base_Color": (1, 0.7, 0.2, 1),
+    "Metallic": 0.9,
+    "Roughness": 0.1,
+    "IOR": 1.4,
+    "Specular_IOR_Level": 0.3,
+    "Alpha": 0.8,
+    "Transmission_Weight": 0.25,
+    "Emission_Color": (1, 0.5, 0, 1),
+    "Emission_Strength": 2,
+}
 
 
 def gold():
@@ -98,7 +108,11 @@ def test_behind_reroutes_muted_nodes_and_groups_both_ways(nodes):
     nodes.link(ins.outputs["Gloss"], principled.inputs["Roughness"], inner)
     nodes.link(principled.outputs[0], outs.inputs[0], inner)
 
-    ins, outs, group = nodes.add("NodeGroupInput", outer), nodes.add("NodeGroupOutput", outer), nodes.add("ShaderNodeGroup", outer)
+    ins, outs, group = (
+        nodes.add("NodeGroupInput", outer),
+        nodes.add("NodeGroupOutput", outer),
+        nodes.add("ShaderNodeGroup", outer),
+    )
     group.node_tree = inner
     muted = nodes.add("ShaderNodeHueSaturation", outer)
     muted.mute = True
@@ -116,12 +130,15 @@ def test_behind_reroutes_muted_nodes_and_groups_both_ways(nodes):
     own = nodes.read()
     assert own.base == pytest.approx((0.1, 0.2, 0.3)) and same(gold(), own) and not nodes.notices
     nodes.tree.links.remove(group.inputs["Tint"].links[0])
-    group.inputs["Tint"].default_value = (0.5, 0.6, 0.7, 1)                # unlinked: the group's own value
+    group.inputs["Tint"].default_value = (0.5, 0.6, 0.7, 1)  # unlinked: the group's own value
     assert nodes.read().base == pytest.approx((0.5, 0.6, 0.7))
 
 
 def test_mixed_shaders(nodes):
-    a, b = nodes.add("ShaderNodeBsdfDiffuse", Color=(1, 0, 0, 1)), nodes.add("ShaderNodeBsdfGlossy", Color=(0, 0, 1, 1), Roughness=0)
+    a, b = (
+        nodes.add("ShaderNodeBsdfDiffuse", Color=(1, 0, 0, 1)),
+        nodes.add("ShaderNodeBsdfGlossy", Color=(0, 0, 1, 1), Roughness=0),
+    )
     mix = nodes.surface(nodes.add("ShaderNodeMixShader", Fac=0.25))
     nodes.link(a.outputs[0], mix.inputs[1])
     nodes.link(b.outputs[0], mix.inputs[2])
@@ -134,24 +151,39 @@ def test_mixed_shaders(nodes):
 
 
 def test_transparent_glass_emission_and_sums(nodes):
-    clear, glass = nodes.add("ShaderNodeBsdfTransparent"), nodes.add("ShaderNodeBsdfGlass", Color=(0.9, 1, 0.8, 1), Roughness=0, IOR=1.33)
+    clear, glass = (
+        nodes.add("ShaderNodeBsdfTransparent"),
+        nodes.add("ShaderNodeBsdfGlass", Color=(0.9, 1, 0.8, 1), Roughness=0, IOR=1.33),
+    )
     mix = nodes.surface(nodes.add("ShaderNodeMixShader", Fac=0.4))
     nodes.link(clear.outputs[0], mix.inputs[1])
     nodes.link(glass.outputs[0], mix.inputs[2])
     own = nodes.read()
-    assert (own.alpha, own.transmission, own.ior, own.mirror) == pytest.approx((0.4, 1, 1.33, 1)) and own.base == pytest.approx((0.9, 1, 0.8))
-    add, glow = nodes.surface(nodes.add("ShaderNodeAddShader")), nodes.add("ShaderNodeEmission", Color=(1, 0.5, 0, 1), Strength=3)
+    assert (own.alpha, own.transmission, own.ior, own.mirror) == pytest.approx(
+        (0.4, 1, 1.33, 1)
+    ) and own.base == pytest.approx((0.9, 1, 0.8))
+    add, glow = (
+        nodes.surface(nodes.add("ShaderNodeAddShader")),
+        nodes.add("ShaderNodeEmission", Color=(1, 0.5, 0, 1), Strength=3),
+    )
     paint = nodes.add("ShaderNodeBsdfDiffuse", Color=(0.2, 0.4, 0.6, 1))
     nodes.link(glow.outputs[0], add.inputs[0])
     nodes.link(paint.outputs[0], add.inputs[1])
     own = nodes.read()
-    assert own.emission == pytest.approx((3, 1.5, 0)) and own.diffuse == 1 and own.base == pytest.approx((0.2, 0.4, 0.6)) and own.alpha == 1
+    assert (
+        own.emission == pytest.approx((3, 1.5, 0))
+        and own.diffuse == 1
+        and own.base == pytest.approx((0.2, 0.4, 0.6))
+        and own.alpha == 1
+    )
     nodes.surface(nodes.add("ShaderNodeBsdfRefraction", Roughness=0, IOR=1.2))
     own = nodes.read()
     assert (own.transmission, own.mirror, own.specular) == (1, 0, 0) and own.ior == pytest.approx(1.2)
 
 
-@pytest.mark.parametrize("float_buffer, space, convert", [(False, None, True), (False, "Non-Color", False), (True, None, False)])
+@pytest.mark.parametrize(
+    "float_buffer, space, convert", [(False, None, True), (False, "Non-Color", False), (True, None, False)]
+)
 def test_a_texture_becomes_linear_pixels(nodes, float_buffer, space, convert):
     image, pixels = picture(float_buffer=float_buffer, space=space)
     texture, principled = nodes.add("ShaderNodeTexImage"), nodes.surface(nodes.add("ShaderNodeBsdfPrincipled"))
@@ -165,7 +197,7 @@ def test_a_texture_becomes_linear_pixels(nodes, float_buffer, space, convert):
     assert np.allclose(own.texture.pixels[..., :3], expected, atol=1e-6)
     assert nodes.mesh.corner_uvs.shape == (2, 3, 2)
     corners = nodes.mesh.vertices[nodes.mesh.triangles][..., :2]
-    assert np.allclose(nodes.mesh.corner_uvs, corners / 2 + 0.5)          # the plane's own unwrapping
+    assert np.allclose(nodes.mesh.corner_uvs, corners / 2 + 0.5)  # the plane's own unwrapping
 
 
 def test_a_file_and_a_packed_image(nodes, tmp_path):
@@ -185,7 +217,10 @@ def test_a_file_and_a_packed_image(nodes, tmp_path):
 def test_a_missing_file_is_named(nodes):
     image = bpy.data.images.new("Gone", 4, 4)
     image.source, image.filepath = "FILE", "//no/such/picture.png"
-    texture, principled = nodes.add("ShaderNodeTexImage"), nodes.surface(nodes.add("ShaderNodeBsdfPrincipled", Base_Color=(0.1, 0.2, 0.3, 1)))
+    texture, principled = (
+        nodes.add("ShaderNodeTexImage"),
+        nodes.surface(nodes.add("ShaderNodeBsdfPrincipled", Base_Color=(0.1, 0.2, 0.3, 1))),
+    )
     texture.image = image
     nodes.link(texture.outputs["Color"], principled.inputs["Base Color"])
     own = nodes.read()
@@ -198,7 +233,10 @@ def test_mapping_and_a_named_uv_map(nodes):
     nodes.object.data.uv_layers.new(name="Second").uv.foreach_set("vector", np.full(8, 0.25, np.float32))
     image, _ = picture()
     texture, principled = nodes.add("ShaderNodeTexImage"), nodes.surface(nodes.add("ShaderNodeBsdfPrincipled"))
-    mapping, uv = nodes.add("ShaderNodeMapping", Location=(0.1, 0.2, 0), Rotation=(0, 0, np.pi / 2), Scale=(2, 3, 1)), nodes.add("ShaderNodeUVMap")
+    mapping, uv = (
+        nodes.add("ShaderNodeMapping", Location=(0.1, 0.2, 0), Rotation=(0, 0, np.pi / 2), Scale=(2, 3, 1)),
+        nodes.add("ShaderNodeUVMap"),
+    )
     texture.image, uv.uv_map = image, "Second"
     nodes.link(uv.outputs[0], mapping.inputs["Vector"])
     nodes.link(mapping.outputs[0], texture.inputs["Vector"])
@@ -215,9 +253,16 @@ def test_mapping_and_a_named_uv_map(nodes):
 
 
 @pytest.mark.parametrize("legacy", [False, True])
-@pytest.mark.parametrize("blend, expected", [("MIX", lambda t, c: t + 0.25 * (c - t)), ("MULTIPLY", lambda t, c: t * (0.75 + 0.25 * c)),
-                                             ("ADD", lambda t, c: t + 0.25 * c), ("LIGHTEN", lambda t, c: t + 0.25 * (np.maximum(t, c) - t)),
-                                             ("SCREEN", lambda t, c: 1 - (0.75 + 0.25 * (1 - c)) * (1 - t))])
+@pytest.mark.parametrize(
+    "blend, expected",
+    [
+        ("MIX", lambda t, c: t + 0.25 * (c - t)),
+        ("MULTIPLY", lambda t, c: t * (0.75 + 0.25 * c)),
+        ("ADD", lambda t, c: t + 0.25 * c),
+        ("LIGHTEN", lambda t, c: t + 0.25 * (np.maximum(t, c) - t)),
+        ("SCREEN", lambda t, c: 1 - (0.75 + 0.25 * (1 - c)) * (1 - t)),
+    ],
+)
 def test_a_texture_mixed_with_a_colour_is_one_texture(nodes, legacy, blend, expected):
     image, pixels = picture(space="Non-Color")
     texture, principled = nodes.add("ShaderNodeTexImage"), nodes.surface(nodes.add("ShaderNodeBsdfPrincipled"))
@@ -252,9 +297,15 @@ def test_a_texture_times_vertex_colours(nodes):
     """Both at once, and the colour attribute that the material names rather than the one used in renders."""
     data = nodes.object.data
     data.color_attributes.new("Shown", "FLOAT_COLOR", "CORNER").data.foreach_set("color", np.ones(16, np.float32))
-    data.color_attributes.new("Wanted", "FLOAT_COLOR", "POINT").data.foreach_set("color", np.arange(16, dtype=np.float32) / 16)
+    data.color_attributes.new("Wanted", "FLOAT_COLOR", "POINT").data.foreach_set(
+        "color", np.arange(16, dtype=np.float32) / 16
+    )
     image, pixels = picture(space="Non-Color")
-    texture, colours, mix = nodes.add("ShaderNodeTexImage"), nodes.add("ShaderNodeVertexColor"), nodes.add("ShaderNodeMixRGB", Fac=1)
+    texture, colours, mix = (
+        nodes.add("ShaderNodeTexImage"),
+        nodes.add("ShaderNodeVertexColor"),
+        nodes.add("ShaderNodeMixRGB", Fac=1),
+    )
     principled = nodes.surface(nodes.add("ShaderNodeBsdfPrincipled"))
     texture.image, colours.layer_name, mix.blend_type = image, "Wanted", "MULTIPLY"
     nodes.link(texture.outputs["Color"], mix.inputs[1])
@@ -295,7 +346,9 @@ def test_cut_out_leaves(nodes, way):
             nodes.link(texture.outputs["Alpha"], principled.inputs["Alpha"])
         else:
             mask = nodes.add("ShaderNodeTexImage")
-            mask.image, other = picture("Mask", space="Non-Color", pixels=np.random.default_rng(9).random((2, 4, 4)), float_buffer=True)
+            mask.image, other = picture(
+                "Mask", space="Non-Color", pixels=np.random.default_rng(9).random((2, 4, 4)), float_buffer=True
+            )
             nodes.link(mask.outputs["Color"], principled.inputs["Alpha"])
             expected = other[..., :3] @ (0.2126, 0.7152, 0.0722)
     own = nodes.read()
@@ -353,5 +406,7 @@ def test_a_material_without_nodes(empty_scene):
     material = bpy.data.materials.new("Plain")
     material.diffuse_color, material.metallic, material.roughness = (0.1, 0.2, 0.3, 1), 0.5, 0.2
     bpy.context.object.data.materials.append(material)
-    own, = read_scene(bpy.context.evaluated_depsgraph_get()).objects[0].materials
-    assert own.base == pytest.approx((0.1, 0.2, 0.3)) and same(Material.principled("", metallic=0.5, roughness=0.2), own)
+    (own,) = read_scene(bpy.context.evaluated_depsgraph_get()).objects[0].materials
+    assert own.base == pytest.approx((0.1, 0.2, 0.3)) and same(
+        Material.principled("", metallic=0.5, roughness=0.2), own
+    )

@@ -1,4 +1,5 @@
 """The surroundings: colour, strength, and an environment picture seen where Cycles shows it."""
+
 import bpy
 import numpy as np
 import pytest
@@ -53,7 +54,11 @@ def test_a_mix_and_a_node_that_cannot_be_read(world):
     assert own.colour == pytest.approx((0.6, 0.7, 0.8)) and not notices
     link(nodes.new("ShaderNodeTexSky").outputs[0], background.inputs["Color"])
     own, notices = read()
-    assert own.colour == pytest.approx((0.6, 0.7, 0.8)) and "Sky Texture" in notices[0].text and "(0.2, 0.4, 0.6)" in notices[0].text
+    assert (
+        own.colour == pytest.approx((0.6, 0.7, 0.8))
+        and "Sky Texture" in notices[0].text
+        and "(0.2, 0.4, 0.6)" in notices[0].text
+    )
 
 
 @pytest.mark.parametrize("vector_type", [None, "POINT", "TEXTURE", "NORMAL"])
@@ -74,7 +79,10 @@ def test_an_environment_picture_lies_where_cycles_shows_it(world, empty_scene, t
     if vector_type:
         mapping, coordinates = nodes.new("ShaderNodeMapping"), nodes.new("ShaderNodeTexCoord")
         mapping.vector_type = vector_type
-        mapping.inputs["Rotation"].default_value, mapping.inputs["Scale"].default_value = (0.3, -0.5, 1.0), (1.0, 0.7, 1.2)
+        mapping.inputs["Rotation"].default_value, mapping.inputs["Scale"].default_value = (
+            (0.3, -0.5, 1.0),
+            (1.0, 0.7, 1.2),
+        )
         link(coordinates.outputs["Generated"], mapping.inputs["Vector"])
         link(mapping.outputs[0], texture.inputs["Vector"])
     camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
