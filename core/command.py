@@ -32,7 +32,7 @@ DONE, FAILED, WRONG_CALL = 0, 1, 2
 DEFAULT_SIDE = 640
 
 #: Seconds between two lines of progress.
-INTERVAL = 2.0
+INTERVAL = 5.0
 
 #: Runs estimated to take longer than this say so before they start.
 LONG_SECONDS = 10.0

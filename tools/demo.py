@@ -19,12 +19,14 @@ from rayscope.core.lab import report
 from rayscope.core.lab.compare import COLUMNS, compare, write
 
 ROOT = Path(__file__).resolve().parent.parent
-SIZE = (960, 540)
+SIZE = (640, 360)
+SAMPLES = 4
+RAYS = 2_000
 #: What is drawn of each structure: the arguments of overlay_data.boxes.
 OVERLAYS = {
     "bvh": {"levels": (5, 11), "opacity": 0.35},
     "grid": {"empty": False, "by": "COUNT", "opacity": 0.15},
-    "octree": {"leaves_only": True, "empty": False, "opacity": 0.35},
+    "octree": {"levels": (1, 5), "empty": False, "opacity": 0.35},
 }
 
 
@@ -51,17 +53,17 @@ def demo(file, out):
         say(str(notice))
     say(f"tracing {SIZE[0]} x {SIZE[1]} pixels, {scene.n_primitives} primitives")
     with stoppable() as progress:
-        result = trace(scene, size=SIZE, samples=4, progress=progress)
+        result = trace(scene, size=SIZE, samples=SAMPLES, progress=progress)
     save_png(out / "picture.png", result.image)
     written = [out / "picture.png", *draw_structures(scene, result.image, out)]
     say("comparing all techniques")
-    compared = compare(scene, n_rays=10_000, say=say)
+    compared = compare(scene, n_rays=RAYS, say=say)
     for line in compared["left_out"]:
         say(f"left out: {line}")
     files, note = write(compared, out, f"{scene.name}: {scene.n_primitives} primitives")
     if note:
         say(note)
-    record = report.record("demo", scene, 0, {"size": SIZE, "samples": 4, "rays": 10_000}, figures=result.figures, **compared)
+    record = report.record("demo", scene, 0, {"size": SIZE, "samples": SAMPLES, "rays": RAYS}, figures=result.figures, **compared)
     (out / "demo.json").write_text(report.to_json(record) + "\n", encoding="utf-8")
     print("", report.table(compared["rows"], COLUMNS), sep="\n")
     return [*written, *files, out / "demo.json"]
