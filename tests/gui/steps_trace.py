@@ -1,0 +1,110 @@
+"""For test_interface.py: trace with the interface alive, stop with Esc, and say how long that took."""
+import json
+import sys
+import time
+from pathlib import Path
+
+import bpy
+import numpy as np
+from bl_ext.user_default.rayscope.addon import work
+from bl_ext.user_default.rayscope.addon.ui import operators
+
+folder = Path(sys.argv[sys.argv.index("--") + 2])
+log = {}
+ticks = []
+
+
+def watch_the_thread(cpu):
+    """Note the thread's own processor time when it last went on, and when it ended."""
+    run, progress = work.Job.run, work.Job.progress
+
+    def going_on(self, fraction):
+        progress(self, fraction)
+        cpu["going"] = time.thread_time()
+
+    def ending(self):
+        run(self)
+        cpu["ended"] = time.thread_time()
+
+    work.Job.run, work.Job.progress = ending, going_on
+
+
+def tick():
+    """How often Blender's main loop comes round."""
+    ticks.append(time.perf_counter())
+    return 0.02
+
+
+def image():
+    found = bpy.data.images["Rayscope"]
+    pixels = np.empty(len(found.pixels), np.float32)
+    found.pixels.foreach_get(pixels)
+    return pixels.reshape(found.size[1], found.size[0], 4)
+
+
+def steps():
+    scene = bpy.context.scene
+    bpy.data.objects.remove(bpy.data.objects["Cube"])
+    bpy.ops.mesh.primitive_monkey_add(size=3.0)
+    bpy.context.object.modifiers.new("Subdivision", "SUBSURF").levels = 2
+    bpy.context.object.rotation_euler = 0.6, 0.0, 0.8
+    scene.render.resolution_x, scene.render.resolution_y = 800, 600
+    scene.rayscope.core, scene.rayscope.samples = "fast", 256
+    area = bpy.context.area
+    area.spaces.active.show_region_ui = True
+    window, screen = bpy.context.window, bpy.context.screen
+    bpy.ops.screen.area_split(direction="VERTICAL", factor=0.5)
+    editor = next(a for a in screen.areas if a.type == "VIEW_3D" and a != area)
+    editor.type = "IMAGE_EDITOR"
+    sidebar = next(region for region in area.regions if region.type == "UI")
+    yield "start"
+    sidebar.active_panel_category = "Rayscope"
+    yield "tab"
+
+    cpu = {}
+    watch_the_thread(cpu)
+    assert bpy.ops.rayscope.trace("INVOKE_DEFAULT") == {"RUNNING_MODAL"}
+    assert work.current() is None, "a run of more than 10 s must ask first"
+    yield "asked"
+    window.event_simulate(type="RET", value="PRESS", x=640, y=400)
+    window.event_simulate(type="RET", value="RELEASE", x=640, y=400)
+    for _ in range(3):
+        yield "going"
+        if work.current():
+            break
+    assert work.current() is not None, "Enter in the dialog must start it"
+    bpy.app.timers.register(tick)
+    yield "running"
+    bpy.app.timers.unregister(tick)
+    log["ticks_per_second"] = len(ticks) / (ticks[-1] - ticks[0])
+    try:
+        bpy.ops.rayscope.build("INVOKE_DEFAULT")
+    except RuntimeError as error:
+        log["second"] = str(error)
+
+    job, times = work.current(), {}
+    cancel, end = work.Job.cancel, operators.Work._end
+    work.Job.cancel = lambda self: (times.setdefault("asked", time.perf_counter()), cancel(self))[1]
+    operators.Work._end = lambda self, task, job: (times.setdefault("kept", time.perf_counter()), end(self, task, job))[1]
+    log["fraction"] = job.fraction
+
+    def press():
+        times["pressed"] = time.perf_counter()
+        window.event_simulate(type="ESC", value="PRESS", x=200, y=400)
+        window.event_simulate(type="ESC", value="RELEASE", x=200, y=400)
+
+    def watch():
+        if job.running or "kept" not in times:
+            return 0.005
+        times["ended"] = time.perf_counter()
+
+    bpy.app.timers.register(press, first_interval=1.5)  # not at once: after this step the harness has the whole window drawn
+    bpy.app.timers.register(watch)
+    while "ended" not in times:
+        yield "stopped"
+    log["cpu"] = cpu["ended"] - cpu["going"]
+    log.update({name: times[name] - times["pressed"] for name in ("asked", "kept", "ended")})
+    pixels = image()
+    log["share_done"] = float((pixels[..., 3] > 0).mean())
+    log["mean"] = float(pixels[..., :3].mean())
+    Path(folder, "log.json").write_text(json.dumps(log))
