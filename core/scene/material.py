@@ -13,7 +13,8 @@ shininess n   2 / r^4 - 2, at most 4096 (Blinn-Phong exponent of a microfacet lo
 specular      (F0 (1 - m) + m C) (n + 8) / 8, at most 64 (the lobe's normalisation)
 mirror        g ((1 - m) F + m C); F is the dielectric's Fresnel reflectance by angle, shifted
               to F0 at normal incidence, and 1 at grazing incidence
-transmission  (1 - m) w C, times 1 - F, at each surface that is passed
+transmission  (1 - m) w sqrt(C), times 1 - F, at each surface that is passed: entering and leaving
+              gives C, as Cycles has it
 emission      emission colour times strength
 alpha         alpha; the rest of the ray goes straight on
 ============  =========================================================================
@@ -72,7 +73,9 @@ class Material:
     mirror, mirror_base : float
         Mirror reflection: `mirror` white plus `mirror_base` times the base colour.
     transmission : float
-        Refracted light, times the base colour.
+        Refracted light, times the base colour to the power of `transmission_exponent`.
+    transmission_exponent : float
+        1/2 gives light that enters and leaves the base colour.
     ior : float
         Index of refraction.
     fresnel : bool
@@ -98,6 +101,7 @@ class Material:
     mirror: float = 0.0
     mirror_base: float = 0.0
     transmission: float = 0.0
+    transmission_exponent: float = 1.0
     ior: float = 1.45
     fresnel: bool = False
     reflectance: float | None = None
@@ -107,7 +111,8 @@ class Material:
 
     @classmethod
     def principled(cls, name, base=(0.8, 0.8, 0.8), metallic=0.0, roughness=0.5, ior=1.5, alpha=1.0,
-                   transmission=0.0, specular_level=0.5, emission=(0.0, 0.0, 0.0), **more):
+                   transmission=0.0, specular_level=0.5, emission=(0.0, 0.0, 0.0),
+                   transmission_exponent=0.5, **more):
         """The material for a Principled BSDF; see the table at the top of this file."""
         dielectric = 1.0 - metallic
         reflectance = min(1.0, 2.0 * specular_level * ((ior - 1.0) / (ior + 1.0)) ** 2)
@@ -120,6 +125,7 @@ class Material:
         return cls(name, base=tuple(base), ambient=diffuse + metallic * (1.0 - gloss), diffuse=diffuse,
                    specular=reflectance * dielectric * lobe, specular_base=metallic * lobe, shininess=shininess,
                    mirror=mirror, mirror_base=metallic * gloss, transmission=dielectric * transmission,
+                   transmission_exponent=transmission_exponent,
                    ior=ior, fresnel=True, reflectance=reflectance, emission=tuple(emission), alpha=alpha, **more)
 
     def reflectance_at_normal(self):

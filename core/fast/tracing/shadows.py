@@ -21,7 +21,7 @@ def passed(table, surface, d):
     eta = 1.0 / table.ior[m]
     cosine_t = refract(d, surface.normal, cosine, eta)[1]
     reflected = np.where(table.fresnel[m] > 0.0, fresnel(cosine, cosine_t, eta), 0.0)
-    return share + surface.alpha * transmission * (1.0 - reflected) * surface.base
+    return share + surface.alpha * transmission * (1.0 - reflected) * table.tint(surface)
 
 
 def filtered(closest, surfaces, o, d, reach):

@@ -9,7 +9,7 @@ from ...scene.scene import Mesh
 from ...scene.solids import slots
 from .vectors import dot, unit
 
-_SCALARS = ("ambient", "diffuse", "specular", "specular_base", "shininess", "mirror", "mirror_base", "transmission",
+_SCALARS = ("ambient", "diffuse", "specular", "specular_base", "shininess", "mirror", "mirror_base", "transmission", "transmission_exponent",
             "ior", "fresnel", "alpha", "texture_alpha", "vertex_colours")
 
 
@@ -34,6 +34,11 @@ class Materials:
         self.reflectance = np.array([m.reflectance_at_normal() for m in materials])
         images = {id(m.texture): m.texture for m in materials if m.texture is not None}
         self.textures = [(image, np.array([m.texture is image for m in materials])) for image in images.values()]
+
+    def tint(self, surface):
+        """Colour that light takes on when it passes through surfaces, shape (3, n)."""
+        exponent = self.transmission_exponent[surface.material]
+        return surface.base if (exponent == 1.0).all() else np.maximum(surface.base, 0.0) ** exponent
 
 
 @dataclass

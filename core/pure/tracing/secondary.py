@@ -41,10 +41,9 @@ def mirrored_and_refracted(surface, d):
         # Fresnel's curve, moved so that it starts at the material's own reflectance: equal to it for plain glass.
         own, plain = material.reflectance_at_normal(), ((ior - 1.0) / (ior + 1.0)) ** 2
         reflected = own + (1.0 - own) * (fresnel(cosine, cosine_t, eta) - plain) / (1.0 - plain)
-        white, coloured, let_in = material.mirror * reflected, material.mirror_base, transmission * (1.0 - reflected)
-    elif total:
-        white, coloured, let_in = material.mirror, material.mirror_base + transmission, 0.0
+        white, let_in, total_share = material.mirror * reflected, transmission * (1.0 - reflected), 0.0
     else:
-        white, coloured, let_in = material.mirror, material.mirror_base, transmission
-    sent_back = tuple(white + coloured * c for c in surface.base)
-    return (off, times(surface.alpha, sent_back)), (into, times(surface.alpha * let_in, surface.base))
+        white, let_in, total_share = material.mirror, 0.0 if total else transmission, transmission if total else 0.0
+    tint = surface.tint()
+    sent_back = tuple(white + material.mirror_base * c + total_share * w for c, w in zip(surface.base, tint))
+    return (off, times(surface.alpha, sent_back)), (into, times(surface.alpha * let_in, tint))

@@ -20,7 +20,7 @@ def passed(surface, d):
         cosine = abs(dot(unit(d), surface.normal))
         eta = 1.0 / index_of_refraction(material)
         reflected = fresnel(cosine, refract(d, surface.normal, cosine, eta)[1], eta)
-    return add(share, times(surface.alpha * material.transmission * (1.0 - reflected), surface.base))
+    return add(share, times(surface.alpha * material.transmission * (1.0 - reflected), surface.tint()))
 
 
 def filtered(closest, surfaces, o, d, reach):

@@ -34,6 +34,11 @@ class Surface:
     base: tuple
     alpha: float
 
+    def tint(self):
+        """Colour that light takes on when it passes through."""
+        exponent = self.material.transmission_exponent
+        return self.base if exponent == 1.0 else tuple(max(c, 0.0) ** exponent for c in self.base)
+
 
 class Surfaces:
     """Finds the surface that belongs to a hit."""
