@@ -1,4 +1,4 @@
-"""Lamps light a white diffuse floor as brightly as Cycles says, within 2 %: in the units documented and in our picture."""
+"""Lamps light a white diffuse floor as brightly as Cycles says, within 2 %: by the fields read, and in our picture."""
 
 import math
 
