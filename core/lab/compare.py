@@ -31,8 +31,8 @@ ONCE_SECONDS = 10.0
 EXAMPLES = 5
 
 COLUMNS = ("technique", "core", "T_B", "T_R", "N_IT", "N_TS", "N_ETS", "memory", "differ", "checked", "differ_embree")
-ALL_COLUMNS = ("technique", "core", "kind", "rays", "T_B", "T_R", "T_primary", "T_secondary", "T_shadow", "N_IT", "N_TS", "N_ETS", "N_EETS", "r_ITM",
-               "memory", "N", "N_G", "N_E", "N_EE", "N_ER", "depth", "c_SAH", "differ", "checked", "differ_embree")
+ALL_COLUMNS = ("technique", "core", "kind", "rays", "T_primary", "T_secondary", "T_shadow", *figures.FIGURES,
+               "differ", "checked", "differ_embree")
 
 
 @dataclass

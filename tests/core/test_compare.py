@@ -139,8 +139,8 @@ def test_brute_force_is_left_out_where_it_would_take_too_long(monkeypatch):
 def test_bad_calls():
     with pytest.raises(SceneError, match="nothing to trace"):
         compare(Scene(), FEW[:1])
-    with pytest.raises(ParameterError, match="no parameter 'walk'"):
-        compare(room(), [Contestant("bvh", "fast", {"walk": "add"})], n_rays=10)
+    with pytest.raises(ParameterError, match="no parameter 'weight'"):
+        compare(room(), [Contestant("bvh", "fast", {"weight": 1})], n_rays=10)
 
 
 def test_files(tmp_path, monkeypatch):
