@@ -38,13 +38,16 @@ def save_png(path, image):
     rows[:, 1:] = np.rint(values[::-1] * 255.0).reshape(height, -1)
     header = struct.pack(">IIBBBBB", width, height, 8, 6 if channels == 4 else 2, 0, 0, 0)
     data = b"\x89PNG\r\n\x1a\n" + b"".join(
-        _chunk(kind, body) for kind, body in ((b"IHDR", header), (b"IDAT", zlib.compress(rows.tobytes(), 6)), (b"IEND", b"")))
+        _chunk(kind, body)
+        for kind, body in ((b"IHDR", header), (b"IDAT", zlib.compress(rows.tobytes(), 6)), (b"IEND", b""))
+    )
     try:
         with open(path, "wb") as file:
             file.write(data)
     except OSError as error:
-        raise RayscopeError(f"{path}: the picture cannot be written there ({error.strerror or error}); "
-                            "choose another folder or name.") from None
+        raise RayscopeError(
+            f"{path}: the picture cannot be written there ({error.strerror or error}); choose another folder or name."
+        ) from None
 
 
 def _chunk(kind, body):

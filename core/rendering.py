@@ -19,9 +19,13 @@ from .scene.camera import check_size
 
 #: What can be set besides the techniques; panels and the command take their ranges from here.
 PARAMETERS = (
-    Parameter("depth", 5, "Reflections and refractions in a row, at most (H); 0 means local light alone", low=0, high=10_000),
-    Parameter("samples", 1, "Samples a pixel; 1 goes through the pixel's centre and gives hard shadows", low=1, high=1_000_000),
-    Parameter("seed", 0, "Chooses other random numbers", low=-2**31, high=2**31 - 1),
+    Parameter(
+        "depth", 5, "Reflections and refractions in a row, at most (H); 0 means local light alone", low=0, high=10_000
+    ),
+    Parameter(
+        "samples", 1, "Samples a pixel; 1 goes through the pixel's centre and gives hard shadows", low=1, high=1_000_000
+    ),
+    Parameter("seed", 0, "Chooses other random numbers", low=-(2**31), high=2**31 - 1),
 )
 
 #: Pass -> (values a pixel, type, value where nothing was met). Blender's float passes have single precision.
@@ -51,20 +55,21 @@ class Result:
     Attributes
     ----------
     image : ndarray, shape (h, w, 4), float32
-        Linear RGB and alpha, row 0 at the bottom. Alpha is 1 where the picture is done, and 0 outside the region and where
-        a cancelled run did not get to.
+        Linear RGB and alpha, row 0 at the bottom. Alpha is 1 where the picture is done, and 0 outside the region and
+        where a cancelled run did not get to.
     passes : dict of ndarray
         With row 0 at the bottom, too:
         ``combined`` (h, w, 4), the image, the mean of the samples;
         from the first sample of each pixel, of the first surface met whatever its alpha: ``depth`` (h, w), along the
         viewing axis, inf where nothing was met; ``normal`` (h, w, 3), the smooth unit normal on the viewer's side, and
-        ``position`` (h, w, 3), both 0 where nothing was met; ``object_index``, ``primitive_index`` (h, w), -1 where nothing was met;
+        ``position`` (h, w, 3), both 0 where nothing was met; ``object_index``, ``primitive_index`` (h, w), -1 where
+        nothing was met;
         summed over samples and all rays of the pixel: ``rays_per_pixel``, and where counted ``n_it``, ``n_ts`` (h, w).
     figures : dict
         ``T_B``: time to build the structures that were not given; ``T_R``: time to trace, s;
-        for ``primary``, ``reflected``, ``refracted``, ``transparent`` (straight on through alpha), ``shadow`` a dict: ``technique``, ``rays``,
-        ``hits``, and where counted ``N_IT``, ``N_TS``, ``N_ETS``, ``N_EETS`` per ray, ``r_ITM``. A shadow ray through glass counts
-        once for each stretch between two surfaces.
+        for ``primary``, ``reflected``, ``refracted``, ``transparent`` (straight on through alpha), ``shadow`` a dict:
+        ``technique``, ``rays``, ``hits``, and where counted ``N_IT``, ``N_TS``, ``N_ETS``, ``N_EETS`` per ray,
+        ``r_ITM``. A shadow ray through glass counts once for each stretch between two surfaces.
     notices : list of Notice
         What is amiss but did not stop the run.
     structures : dict
@@ -80,8 +85,24 @@ class Result:
     cancelled: bool = False
 
 
-def trace(scene, technique="bvh", core="fast", size=(640, 480), depth=5, samples=1, seed=0, primary=None, shadow=None,
-          secondary=None, region=None, index=None, progress=None, on_tile=None, count=False, parameters=None):
+def trace(
+    scene,
+    technique="bvh",
+    core="fast",
+    size=(640, 480),
+    depth=5,
+    samples=1,
+    seed=0,
+    primary=None,
+    shadow=None,
+    secondary=None,
+    region=None,
+    index=None,
+    progress=None,
+    on_tile=None,
+    count=False,
+    parameters=None,
+):
     """Trace a picture as Whitted (1980) did.
 
     Parameters
@@ -94,14 +115,15 @@ def trace(scene, technique="bvh", core="fast", size=(640, 480), depth=5, samples
     size : (int, int)
         Width and height in pixels.
     depth : int
-        Reflections and refractions in a row, at most (H). Passing straight through a surface with alpha is none of them.
+        Reflections and refractions in a row, at most (H). Passing straight through a surface with alpha is none of
+        them.
     samples : int
-        Samples a pixel. With 1, rays go through the pixels' centres and lights cast hard shadows from their centres; with more,
-        both are chosen at random, by a hash of pixel, sample and seed.
+        Samples a pixel. With 1, rays go through the pixels' centres and lights cast hard shadows from their centres;
+        with more, both are chosen at random, by a hash of pixel, sample and seed.
     seed : int
     primary, shadow, secondary : str or (str, dict), optional
-        A technique, or one with its parameters, for camera rays; shadow rays; reflected, refracted and transparent rays.
-        The same technique with the same parameters is built once.
+        A technique, or one with its parameters, for camera rays; shadow rays; reflected, refracted and transparent
+        rays. The same technique with the same parameters is built once.
     region : (int, int, int, int), optional
         x0, y0, x1, y1 in pixels from the bottom left corner: only x0 <= x < x1, y0 <= y < y1 is traced.
     index : Structure, optional
@@ -133,8 +155,23 @@ def trace(scene, technique="bvh", core="fast", size=(640, 480), depth=5, samples
     Cancelled
         When stopped while structures were built.
     """
-    rendering = Rendering(scene, technique, core, size, depth, samples, seed, primary, shadow, secondary, region, index,
-                          progress, count, parameters)
+    rendering = Rendering(
+        scene,
+        technique,
+        core,
+        size,
+        depth,
+        samples,
+        seed,
+        primary,
+        shadow,
+        secondary,
+        region,
+        index,
+        progress,
+        count,
+        parameters,
+    )
     for tile in rendering.tiles():
         if on_tile:
             on_tile(*tile)
@@ -152,8 +189,24 @@ class Rendering:
     result : Result
     """
 
-    def __init__(self, scene, technique="bvh", core="fast", size=(640, 480), depth=5, samples=1, seed=0, primary=None,
-                 shadow=None, secondary=None, region=None, index=None, progress=None, count=False, parameters=None):
+    def __init__(
+        self,
+        scene,
+        technique="bvh",
+        core="fast",
+        size=(640, 480),
+        depth=5,
+        samples=1,
+        seed=0,
+        primary=None,
+        shadow=None,
+        secondary=None,
+        region=None,
+        index=None,
+        progress=None,
+        count=False,
+        parameters=None,
+    ):
         if core not in CORES:
             raise ParameterError(f"trace: there is no core {core!r}. Cores: {', '.join(CORES)}.")
         values = resolve("trace", PARAMETERS, {"depth": depth, "samples": samples, "seed": seed}, core)
@@ -161,12 +214,16 @@ class Rendering:
         self.samples = values["samples"]
         self.size = check_size(size)
         if scene.camera is None:
-            raise SceneError(f"{scene.name}: there is no camera to see it from. Add one (in Blender: Add > Camera, "
-                             "then View > Cameras > Set Active Object as Camera).")
+            raise SceneError(
+                f"{scene.name}: there is no camera to see it from. Add one (in Blender: Add > Camera, "
+                "then View > Cameras > Set Active Object as Camera)."
+            )
         with np.errstate(all="ignore"):
             if not all(np.isfinite(v).all() for v in (*scene.camera.frame(), scene.camera.window)):
-                raise SceneError(f"{scene.camera.name}: it has no place or direction, or its picture no size (a scale of zero, NaN "
-                                 "or infinite numbers); reset its transform.")
+                raise SceneError(
+                    f"{scene.camera.name}: it has no place or direction, or its picture no size (a scale of zero, NaN "
+                    "or infinite numbers); reset its transform."
+                )
         self.region = _check_region(region, self.size)
         names = [name for name in PASSES if self.count or name not in COUNTED_PASSES]
         self._progress, self._fraction, self._told = progress, 0.0, -math.inf
@@ -175,20 +232,32 @@ class Rendering:
         self.result = Result(passes["combined"], passes, notices=_notices(scene))
         self._build(wanted, index)
         tracer = import_module(f".{core}.tracing.whitted", __package__).Whitted
-        self._tracer = tracer(scene, self.result.structures, self.size, values["depth"], self.samples, values["seed"],
-                              self.count, self._check)
+        self._tracer = tracer(
+            scene,
+            self.result.structures,
+            self.size,
+            values["depth"],
+            self.samples,
+            values["seed"],
+            self.count,
+            self._check,
+        )
 
     def _wanted(self, technique, parameters, primary, shadow, secondary, index, depth):
         """Kind of ray -> (technique, its parameters), or None for `index`; only the kinds that the scene needs."""
         if index is not None and hasattr(index, "closest_ray") != (self.core == "pure"):
             raise ParameterError(f"trace: the structure given as index is not of the core {self.core!r}.")
         if index is not None and parameters:
-            raise ParameterError("trace: parameters belong to a technique that is to be built, but index is built already.")
+            raise ParameterError(
+                "trace: parameters belong to a technique that is to be built, but index is built already."
+            )
         materials = self.scene.used_materials()
         bounces = depth > 0 and any(m.reflects for m in materials)
-        needed = {"primary": (primary, True),
-                  "secondary": (secondary, bounces or any(m.transparent for m in materials)),
-                  "shadow": (shadow, any(light.shadows and any(light.colour) for light in self.scene.lights))}
+        needed = {
+            "primary": (primary, True),
+            "secondary": (secondary, bounces or any(m.transparent for m in materials)),
+            "shadow": (shadow, any(light.shadows and any(light.colour) for light in self.scene.lights)),
+        }
         wanted = {}
         for kind, (choice, need) in needed.items():
             if choice is None and index is not None:
@@ -202,19 +271,25 @@ class Rendering:
                 raise ParameterError(f"{name} has no core {self.core!r}. It has: {', '.join(row.cores)}.")
             wanted[kind] = name, resolve(name, row.parameters, given, self.core)
             if need and kind not in row.rays:
-                raise ParameterError(f"{name} serves {' and '.join(row.rays)} rays only; name another technique for {kind} rays.")
+                raise ParameterError(
+                    f"{name} serves {' and '.join(row.rays)} rays only; name another technique for {kind} rays."
+                )
         return {kind: choice for kind, choice in wanted.items() if needed[kind][1]}
 
     def _build(self, wanted, index):
         """Build every different structure once."""
         built = {}
-        keys = {kind: None if choice is None else (choice[0], tuple(sorted(choice[1].items())))
-                for kind, choice in wanted.items()}
+        keys = {
+            kind: None if choice is None else (choice[0], tuple(sorted(choice[1].items())))
+            for kind, choice in wanted.items()
+        }
         todo = list(dict.fromkeys(k for k in keys.values() if k is not None))
         for i, key in enumerate(todo):
+
             def report(fraction, i=i):
                 self._fraction = BUILDING * (i + fraction) / len(todo)
                 self._check()
+
             built[key] = build(self.scene, key[0], self.core, progress=report, **dict(key[1]))
         self.result.structures = {kind: index if key is None else built[key] for kind, key in keys.items()}
         self.result.figures["T_B"] = sum(s.figures["T_B"] for s in built.values())
@@ -258,7 +333,11 @@ class Rendering:
         shape = (y1 - y0, x1 - x0)
         for name, value in values.items():
             target = self.result.passes[name][y0:y1, x0:x1]
-            value = np.asarray(value).reshape(*shape, *target.shape[2:-1], -1) if target.ndim == 3 else np.reshape(value, shape)
+            value = (
+                np.asarray(value).reshape(*shape, *target.shape[2:-1], -1)
+                if target.ndim == 3
+                else np.reshape(value, shape)
+            )
             if name == "combined":
                 # The mean so far; a picture stopped now is complete.
                 target[..., :3] += (value - target[..., :3]) / (sample + 1)
@@ -275,7 +354,11 @@ class Rendering:
         figures["T_R"] = time.perf_counter() - began
         for kind, tally in self._tracer.tally.items():
             structure = self.result.structures.get(kind if kind in ("primary", "shadow") else "secondary")
-            row = {"technique": structure.technique.name if structure else None, "rays": tally["rays"], "hits": tally["hits"]}
+            row = {
+                "technique": structure.technique.name if structure else None,
+                "rays": tally["rays"],
+                "hits": tally["hits"],
+            }
             if self.count:
                 row |= ray_figures(*(tally[name] for name in PER_RAY), tally["rays"], tally["hits"])
             figures[kind] = row
@@ -291,7 +374,9 @@ def _check_region(region, size):
     except (TypeError, ValueError):
         raise SceneError(f"Region: four whole numbers are needed, x0, y0, x1, y1, not {region!r}.") from None
     if not (0 <= x0 < x1 <= width and 0 <= y0 < y1 <= height):
-        raise SceneError(f"Region: {x0}, {y0}, {x1}, {y1} is empty or reaches out of the picture of {width} x {height} pixels.")
+        raise SceneError(
+            f"Region: {x0}, {y0}, {x1}, {y1} is empty or reaches out of the picture of {width} x {height} pixels."
+        )
     return x0, y0, x1, y1
 
 
@@ -301,10 +386,14 @@ def _framebuffer(size, names):
     need = width * height * sum(PASSES[n][0] * np.dtype(PASSES[n][1]).itemsize for n in names)
     there = _memory()
     if need > 0.75 * there:
-        raise MemoryEstimateError(f"Picture of {width} x {height} pixels: its passes would take {need / 2**30:.1f} GiB of the "
-                                  f"{there / 2**30:.1f} GiB of memory; choose a smaller resolution.")
-    return {name: np.full((height, width) if k == 1 else (height, width, k), empty, dtype)
-            for name, (k, dtype, empty) in ((n, PASSES[n]) for n in names)}
+        raise MemoryEstimateError(
+            f"Picture of {width} x {height} pixels: its passes would take {need / 2**30:.1f} GiB of the "
+            f"{there / 2**30:.1f} GiB of memory; choose a smaller resolution."
+        )
+    return {
+        name: np.full((height, width) if k == 1 else (height, width, k), empty, dtype)
+        for name, (k, dtype, empty) in ((n, PASSES[n]) for n in names)
+    }
 
 
 def _memory():
@@ -319,8 +408,13 @@ def _notices(scene):
     """What is amiss with a scene that shall be traced."""
     if any(any(light.colour) for light in scene.lights):
         return []
-    return [Notice(scene.name, "no light shines; the picture shows emission, ambient light and the surroundings alone. "
-                   "Add a light (in Blender: Add > Light).")]
+    return [
+        Notice(
+            scene.name,
+            "no light shines; the picture shows emission, ambient light and the surroundings alone. "
+            "Add a light (in Blender: Add > Light).",
+        )
+    ]
 
 
 def _tiles(region, side):

@@ -1,16 +1,34 @@
-"""The call `trace`: what it returns, what it refuses, how it is watched and stopped; and that both cores draw one picture."""
+"""The call `trace`: what it returns, refuses, how it is watched and stopped; and that both cores draw one picture."""
 
 import math
 import subprocess
 import sys
 import zlib
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 import rayscope.core
-from rayscope.core import (Camera, Cancelled, Light, Material, MemoryEstimateError, Mesh, Object, ParameterError, RayscopeError, Scene,
-                           SceneError, Shapes, World, build, solids, techniques, trace)
+from rayscope.core import (
+    Camera,
+    Cancelled,
+    Light,
+    Material,
+    MemoryEstimateError,
+    Mesh,
+    Object,
+    ParameterError,
+    RayscopeError,
+    Scene,
+    SceneError,
+    Shapes,
+    World,
+    build,
+    solids,
+    techniques,
+    trace,
+)
 from rayscope.core.image_file import save_png, to_srgb
 from rayscope.core.rendering import Rendering
 from rayscope.core.scene.material import Image
@@ -28,8 +46,12 @@ def ball(centre, radius, smooth=True, around=10, down=6):
     a, b = i * (around + 1) + j, (i + 1) * (around + 1) + j
     triangles = np.concatenate([np.stack([a, b, b + 1], 1)[i < down - 1], np.stack([a, b + 1, a + 1], 1)[i > 0]])
     points, uvs = normals.reshape(-1, 3), uvs.reshape(-1, 2)
-    return Mesh(points * radius + centre, triangles, corner_normals=points[triangles].astype(np.float32) if smooth else None,
-                corner_uvs=uvs[triangles].astype(np.float32))
+    return Mesh(
+        points * radius + centre,
+        triangles,
+        corner_normals=points[triangles].astype(np.float32) if smooth else None,
+        corner_uvs=uvs[triangles].astype(np.float32),
+    )
 
 
 def sheet(a, b, c, d, **more):
@@ -39,40 +61,98 @@ def sheet(a, b, c, d, **more):
 
 
 def everything():
-    """A small scene with one of everything: glass, metal, lacquer, alpha, cut-outs, textures, vertex colours, slots, smooth and
-    flat, an analytic sphere, every kind of light, surroundings with a picture."""
+    """A small scene with one of everything: glass, metal, lacquer, alpha, cut-outs, textures, vertex colours, slots,
+    smooth and flat, an analytic sphere, every kind of light, surroundings with a picture."""
     rng = np.random.default_rng(5)
     checks = np.ones((4, 4, 4), np.float32)
-    checks[..., :3] = np.where((np.add.outer(np.arange(4), np.arange(4)) % 2)[..., None], (0.2, 0.3, 0.6), (0.9, 0.8, 0.6))
+    checks[..., :3] = np.where(
+        (np.add.outer(np.arange(4), np.arange(4)) % 2)[..., None], (0.2, 0.3, 0.6), (0.9, 0.8, 0.6)
+    )
     cut = np.ones((4, 4, 4), np.float32)
     cut[..., 3] = rng.random((4, 4))
     sky = np.ones((8, 16, 4), np.float32)
     sky[..., :3] = rng.random((8, 16, 3)) * 0.6
-    wall = sheet((-4, 4, 0), (4, 4, 0), (4, 4, 4), (-4, 4, 4), slots=np.array([0, 7]),
-                 corner_colours=rng.random((2, 3, 4)).astype(np.float32))
+    wall = sheet(
+        (-4, 4, 0),
+        (4, 4, 0),
+        (4, 4, 4),
+        (-4, 4, 4),
+        slots=np.array([0, 7]),
+        corner_colours=rng.random((2, 3, 4)).astype(np.float32),
+    )
     turned = np.array([[0.8, -0.6, 0, 2.5], [0.6, 0.8, 0, -1.5], [0, 0, -1.2, 0.7], [0, 0, 0, 1]])
     principled = Material.principled
     objects = [
-        Object("floor", sheet((-6, -6, 0), (6, -6, 0), (6, 6, 0), (-6, 6, 0)),
-               materials=(Material("floor", texture=Image("checks", checks, "closest", mapping=np.array([[3, 0, 0], [0.5, 3, 0.1]]))),)),
-        Object("wall", wall, materials=(Material("painted", vertex_colours=True),
-                                        principled("lacquer", base=(0.7, 0.1, 0.1), roughness=0.15, specular_level=0.8))),
-        Object("glass", ball((-1.4, -1, 1), 1), materials=(principled("glass", (0.8, 1, 0.9), roughness=0, transmission=1, ior=1.45),)),
-        Object("metal", ball((1.3, 1, 1.2), 1.2), materials=(principled("metal", (0.9, 0.7, 0.4), metallic=1, roughness=0.1),)),
-        Object("turned", ball((0, 0, 0), 0.6), turned, materials=(Material("map", texture=Image("map", sky, extension="extend")),)),
-        Object("flat", ball((-2.6, 1.6, 0.8), 0.8, smooth=False), materials=(principled("matte", (0.3, 0.4, 0.8), roughness=0.9),)),
-        Object("leaf", sheet((-3, -2.2, 0), (-1.5, -3, 0), (-1.5, -3, 1.5), (-3, -2.2, 1.5)),
-               materials=(Material("leaf", texture=Image("leaf", cut, extension="clip"), texture_alpha=True),)),
-        Object("veil", sheet((0.2, -3, 0), (1.4, -2.5, 0), (1.4, -2.5, 1.4), (0.2, -3, 1.4)), materials=(Material("veil", alpha=0.4),)),
-        Object("sphere", Shapes([solids.sphere((0, -1.5, 0.4), 0.4)]),
-               materials=(Material("old glass", mirror=0.2, transmission=0.7, ior=1.3, emission=(0.05, 0, 0)),)),
+        Object(
+            "floor",
+            sheet((-6, -6, 0), (6, -6, 0), (6, 6, 0), (-6, 6, 0)),
+            materials=(
+                Material(
+                    "floor", texture=Image("checks", checks, "closest", mapping=np.array([[3, 0, 0], [0.5, 3, 0.1]]))
+                ),
+            ),
+        ),
+        Object(
+            "wall",
+            wall,
+            materials=(
+                Material("painted", vertex_colours=True),
+                principled("lacquer", base=(0.7, 0.1, 0.1), roughness=0.15, specular_level=0.8),
+            ),
+        ),
+        Object(
+            "glass",
+            ball((-1.4, -1, 1), 1),
+            materials=(principled("glass", (0.8, 1, 0.9), roughness=0, transmission=1, ior=1.45),),
+        ),
+        Object(
+            "metal",
+            ball((1.3, 1, 1.2), 1.2),
+            materials=(principled("metal", (0.9, 0.7, 0.4), metallic=1, roughness=0.1),),
+        ),
+        Object(
+            "turned",
+            ball((0, 0, 0), 0.6),
+            turned,
+            materials=(Material("map", texture=Image("map", sky, extension="extend")),),
+        ),
+        Object(
+            "flat",
+            ball((-2.6, 1.6, 0.8), 0.8, smooth=False),
+            materials=(principled("matte", (0.3, 0.4, 0.8), roughness=0.9),),
+        ),
+        Object(
+            "leaf",
+            sheet((-3, -2.2, 0), (-1.5, -3, 0), (-1.5, -3, 1.5), (-3, -2.2, 1.5)),
+            materials=(Material("leaf", texture=Image("leaf", cut, extension="clip"), texture_alpha=True),),
+        ),
+        Object(
+            "veil",
+            sheet((0.2, -3, 0), (1.4, -2.5, 0), (1.4, -2.5, 1.4), (0.2, -3, 1.4)),
+            materials=(Material("veil", alpha=0.4),),
+        ),
+        Object(
+            "sphere",
+            Shapes([solids.sphere((0, -1.5, 0.4), 0.4)]),
+            materials=(Material("old glass", mirror=0.2, transmission=0.7, ior=1.3, emission=(0.05, 0, 0)),),
+        ),
     ]
-    lights = [Light("point", "point", (20, 20, 20), (2, -4, 6), radius=0.4),
-              Light("sun", "sun", (0.8, 0.7, 0.5), direction=(-0.5, 0.4, -0.77), radius=0.05),
-              Light("spot", "spot", (90, 60, 30), (-4, -4, 5), direction=(0.5, 0.55, -0.66), spot_angle=0.7, spot_blend=0.3),
-              Light("square", "area", (8, 8, 12), (0, 4, 5), direction=(0, -0.6, -0.8), axes=((0.7, 0, 0), (0, 0.56, -0.42))),
-              Light("disc", "area", (5, 9, 5), (-5, 0, 4), direction=(0.8, 0, -0.6), axes=((0.3, 0, 0.4), (0, 0.5, 0)), shape="ellipse"),
-              Light("lamp", "point", (0.4, 0.3, 0.1), (0, 0, 3), falloff=False, shadows=False)]
+    lights = [
+        Light("point", "point", (20, 20, 20), (2, -4, 6), radius=0.4),
+        Light("sun", "sun", (0.8, 0.7, 0.5), direction=(-0.5, 0.4, -0.77), radius=0.05),
+        Light("spot", "spot", (90, 60, 30), (-4, -4, 5), direction=(0.5, 0.55, -0.66), spot_angle=0.7, spot_blend=0.3),
+        Light("square", "area", (8, 8, 12), (0, 4, 5), direction=(0, -0.6, -0.8), axes=((0.7, 0, 0), (0, 0.56, -0.42))),
+        Light(
+            "disc",
+            "area",
+            (5, 9, 5),
+            (-5, 0, 4),
+            direction=(0.8, 0, -0.6),
+            axes=((0.3, 0, 0.4), (0, 0.5, 0)),
+            shape="ellipse",
+        ),
+        Light("lamp", "point", (0.4, 0.3, 0.1), (0, 0, 3), falloff=False, shadows=False),
+    ]
     camera = Camera.look_at((1.0, -8, 4), (0, 0, 0.8), angle=math.radians(42), aspect=4 / 3)
     world = World((1, 0.9, 0.8), image=Image("sky", sky), rotation=np.array([[0.6, 0.8, 0], [-0.8, 0.6, 0], [0, 0, 1]]))
     return Scene(objects, lights, camera, world)
@@ -80,8 +160,13 @@ def everything():
 
 def simple(**more):
     """A matte triangle under a lamp."""
-    return Scene.from_triangles([(-1, -1, 0), (1, -1, 0), (0, 1, 0)], [(0, 1, 2)], lights=[Light("lamp", "point", (5, 5, 5), (1, 1, 3))],
-                                camera=Camera.look_at((0, -2, 3), (0, 0, 0)), **more)
+    return Scene.from_triangles(
+        [(-1, -1, 0), (1, -1, 0), (0, 1, 0)],
+        [(0, 1, 2)],
+        lights=[Light("lamp", "point", (5, 5, 5), (1, 1, 3))],
+        camera=Camera.look_at((0, -2, 3), (0, 0, 0)),
+        **more,
+    )
 
 
 def simple_with(camera):
@@ -91,7 +176,9 @@ def simple_with(camera):
     return scene
 
 
-@pytest.mark.parametrize("samples, depth, camera", [(1, 4, "perspective"), (3, 2, "perspective"), (1, 3, "orthographic")])
+@pytest.mark.parametrize(
+    "samples, depth, camera", [(1, 4, "perspective"), (3, 2, "perspective"), (1, 3, "orthographic")]
+)
 def test_both_cores_draw_the_same_picture(samples, depth, camera):
     scene = everything()
     if camera == "orthographic":
@@ -111,6 +198,7 @@ def test_both_cores_draw_the_same_picture(samples, depth, camera):
 def test_random_numbers_are_the_same_bits_in_both_cores():
     from rayscope.core.fast.tracing import sampling as fast
     from rayscope.core.pure.tracing import sampling as pure
+
     pixels = [0, 1, 2, 640 * 480 - 1, 2**40]
     for seed in (0, 1, -1, 2**31 - 1):
         for sample in (0, 1, 999):
@@ -123,11 +211,17 @@ def test_random_numbers_are_the_same_bits_in_both_cores():
 
 def test_random_numbers_are_uniform_and_unrelated():
     from rayscope.core.fast.tracing import sampling
+
     n = 20_000
     key = sampling.first_key(np.arange(n), 0, 0)
-    columns = np.array([sampling.number(key, d) for d in range(4)]
-                       + [sampling.number(sampling.branch(key, 1), 0), sampling.number(sampling.first_key(np.arange(n), 1, 0), 0),
-                          sampling.number(sampling.first_key(np.arange(n), 0, 1), 0)])
+    columns = np.array(
+        [sampling.number(key, d) for d in range(4)]
+        + [
+            sampling.number(sampling.branch(key, 1), 0),
+            sampling.number(sampling.first_key(np.arange(n), 1, 0), 0),
+            sampling.number(sampling.first_key(np.arange(n), 0, 1), 0),
+        ]
+    )
     assert columns.min() >= 0.0 and columns.max() < 1.0
     np.testing.assert_allclose(columns.mean(axis=1), 0.5, atol=5 / math.sqrt(12 * n))
     correlation = np.corrcoef(columns) - np.eye(len(columns))
@@ -145,7 +239,9 @@ def test_techniques_do_not_change_the_picture():
         got = trace(scene, row.name, size=(10, 8), depth=3)
         tried += 1
         for name in want.passes:
-            np.testing.assert_allclose(got.passes[name], want.passes[name], rtol=1e-5, atol=1e-5, err_msg=f"{row.name}: {name}")
+            np.testing.assert_allclose(
+                got.passes[name], want.passes[name], rtol=1e-5, atol=1e-5, err_msg=f"{row.name}: {name}"
+            )
     assert tried >= 2
 
 
@@ -159,7 +255,7 @@ def test_each_kind_of_ray_its_own_technique(core):
     assert used["shadow"].parameters["leaf_size"] == 4
     figures = result.figures
     assert (figures["primary"]["technique"], figures["reflected"]["technique"]) == ("bvh", "brute")
-    assert figures["reflected"]["N_IT"] == scene.n_primitives           # brute force tests all of them
+    assert figures["reflected"]["N_IT"] == scene.n_primitives  # brute force tests all of them
     assert 0 < figures["primary"]["N_IT"] < scene.n_primitives / 2
     same = trace(scene, "bvh", core, (8, 6), primary=("bvh", {}), shadow="bvh")
     assert len({id(s) for s in same.structures.values()}) == 1
@@ -181,8 +277,10 @@ def test_counts_add_up(core):
 def test_passes_against_formulas(core):
     """A plane seen at an angle: depth along the viewing axis, position on the plane, normal towards the viewer."""
     scene = simple()
-    scene.objects = [Object("below", ball((0, 0, -50), 1)),
-                     Object("plane", sheet((-9, 9, 0), (9, 9, 0), (9, -9, 0), (-9, -9, 0)))]     # facing down
+    scene.objects = [
+        Object("below", ball((0, 0, -50), 1)),
+        Object("plane", sheet((-9, 9, 0), (9, 9, 0), (9, -9, 0), (-9, -9, 0))),
+    ]  # facing down
     result = trace(scene, "brute", core, (6, 4))
     y, x = np.mgrid[:4, :6] + 0.5
     origins, directions = scene.camera.rays(x.ravel(), y.ravel(), (6, 4))
@@ -194,7 +292,9 @@ def test_passes_against_formulas(core):
     assert set(np.unique(result.passes["primitive_index"])) == {0, 1}
     scene.camera = Camera.look_at((0, 0, 3), (0, 0, 9), up=(0, 1, 0))
     away = trace(scene, "brute", core, (2, 2)).passes
-    assert np.isinf(away["depth"]).all() and (away["object_index"] == -1).all() and (away["primitive_index"] == -1).all()
+    assert (
+        np.isinf(away["depth"]).all() and (away["object_index"] == -1).all() and (away["primitive_index"] == -1).all()
+    )
     assert not away["normal"].any() and not away["position"].any()
 
 
@@ -235,9 +335,10 @@ def test_cancelling_keeps_what_is_finished(core):
     def stop(fraction):
         if len(done) == 2:
             raise Cancelled("enough")
+
     result = trace(scene, "bvh", core, size, depth=0, progress=stop, on_tile=lambda *tile: done.append(tile))
     assert result.cancelled and len(done) == 2
-    assert done[0] == (side, 0, 2 * side, 4)                             # the middle comes first
+    assert done[0] == (side, 0, 2 * side, 4)  # the middle comes first
     finished = np.zeros(size[::-1], bool)
     for x0, y0, x1, y1 in done:
         finished[y0:y1, x0:x1] = True
@@ -253,6 +354,7 @@ def test_cancelling_between_samples_leaves_a_complete_picture():
     def stop(fraction):
         if len(done) == 3:
             raise Cancelled("enough")
+
     result = trace(scene, "bvh", size=(10, 8), samples=50, progress=stop, on_tile=lambda *tile: done.append(tile))
     assert result.cancelled and (result.image[..., 3] == 1).all()
     # The mean of the first three samples, which a finished picture of three samples has, too.
@@ -262,6 +364,7 @@ def test_cancelling_between_samples_leaves_a_complete_picture():
 def test_cancelling_while_building_raises():
     def stop(fraction):
         raise Cancelled("enough")
+
     with pytest.raises(Cancelled):
         Rendering(everything(), "bvh", "pure", progress=stop)
 
@@ -299,7 +402,11 @@ def test_many_samples_smooth_an_edge():
     """Anti-aliasing: a pixel half covered tends to half the colour."""
     scene = simple(world=World((0, 0, 0)))
     scene.lights = []
-    scene.objects = [Object("o", sheet((-9, -9, 0), (0, -9, 0), (0, 9, 0), (-9, 9, 0)), materials=(Material("m", emission=(1, 1, 1)),))]
+    scene.objects = [
+        Object(
+            "o", sheet((-9, -9, 0), (0, -9, 0), (0, 9, 0), (-9, 9, 0)), materials=(Material("m", emission=(1, 1, 1)),)
+        )
+    ]
     scene.camera = Camera.look_at((0, 0, 5), (0, 0, 0), up=(0, 1, 0))
     assert trace(scene, "brute", size=(1, 1), samples=400).image[0, 0, 0] == pytest.approx(0.5, abs=0.1)
 
@@ -307,19 +414,25 @@ def test_many_samples_smooth_an_edge():
 def test_what_cannot_be_done_is_said():
     scene = simple()
     for error, words, arguments in (
-            (SceneError, "camera", {"scene": Scene(name="Bare")}),
-            (SceneError, "Flat: .* scale of zero", {"scene": simple_with(Camera(np.diag([1.0, 0, 1, 1]), name="Flat"))}),
-            (SceneError, "between 1 and", {"size": (0, 10)}), (SceneError, "between 1 and", {"size": (100_000, 100_000)}),
-            (SceneError, "whole numbers", {"size": "big"}),
-            (SceneError, "empty", {"region": (5, 5, 5, 9)}), (SceneError, "reaches out", {"region": (0, 0, 999, 9)}),
-            (SceneError, "four whole numbers", {"region": (1, 2)}),
-            (ParameterError, "depth", {"depth": -1}), (ParameterError, "samples", {"samples": 0}),
-            (ParameterError, "whole number", {"samples": 1.5}), (ParameterError, "seed", {"seed": "x"}),
-            (ParameterError, "did you mean 'bvh'", {"technique": "bhv"}), (ParameterError, "Techniques: ", {"shadow": "automatic"}),
-            (ParameterError, "fast, pure|pure, fast", {"core": "gpu"}),
-            (ParameterError, "has no core", {"technique": "embree", "core": "pure"}),
-            (ParameterError, "no parameter 'leafs'", {"parameters": {"leafs": 1}}),
-            (ParameterError, "no parameter", {"primary": ("grid", {"leaf_size": 1})})):
+        (SceneError, "camera", {"scene": Scene(name="Bare")}),
+        (SceneError, "Flat: .* scale of zero", {"scene": simple_with(Camera(np.diag([1.0, 0, 1, 1]), name="Flat"))}),
+        (SceneError, "between 1 and", {"size": (0, 10)}),
+        (SceneError, "between 1 and", {"size": (100_000, 100_000)}),
+        (SceneError, "whole numbers", {"size": "big"}),
+        (SceneError, "empty", {"region": (5, 5, 5, 9)}),
+        (SceneError, "reaches out", {"region": (0, 0, 999, 9)}),
+        (SceneError, "four whole numbers", {"region": (1, 2)}),
+        (ParameterError, "depth", {"depth": -1}),
+        (ParameterError, "samples", {"samples": 0}),
+        (ParameterError, "whole number", {"samples": 1.5}),
+        (ParameterError, "seed", {"seed": "x"}),
+        (ParameterError, "did you mean 'bvh'", {"technique": "bhv"}),
+        (ParameterError, "Techniques: ", {"shadow": "automatic"}),
+        (ParameterError, "fast, pure|pure, fast", {"core": "gpu"}),
+        (ParameterError, "has no core", {"technique": "embree", "core": "pure"}),
+        (ParameterError, "no parameter 'leafs'", {"parameters": {"leafs": 1}}),
+        (ParameterError, "no parameter", {"primary": ("grid", {"leaf_size": 1})}),
+    ):
         with pytest.raises(error, match=words):
             trace(**{"scene": scene, "size": (8, 8), **arguments})
 
@@ -335,7 +448,11 @@ def test_no_light_is_noted_and_the_rest_is_drawn(core):
     scene = simple(world=World((0.5, 0.25, 1)))
     scene.lights = [Light("dark", "point", (0, 0, 0))]
     result = trace(scene, "brute", core, (9, 9))
-    assert "light" in str(result.notices[0]) and result.figures["shadow"]["rays"] == 0 and "shadow" not in result.structures
+    assert (
+        "light" in str(result.notices[0])
+        and result.figures["shadow"]["rays"] == 0
+        and "shadow" not in result.structures
+    )
     hit = result.passes["object_index"] == 0
     assert hit.any()
     np.testing.assert_allclose(result.image[hit][:, :3], [[0.4, 0.2, 0.8]] * hit.sum(), rtol=1e-6)
@@ -356,7 +473,8 @@ import sys
 from rayscope.core import Camera, Light, Material, Scene, trace
 def loaded():
     return {{m.rpartition(".")[2] for m in sys.modules if "rayscope.core.{core}.tracing." in m}}
-scene = Scene.from_triangles([(-1, -1, 0), (1, -1, 0), (0, 1, 0)], [(0, 1, 2)], camera=Camera.look_at((0, -2, 3), (0, 0, 0)))
+camera = Camera.look_at((0, -2, 3), (0, 0, 0))
+scene = Scene.from_triangles([(-1, -1, 0), (1, -1, 0), (0, 1, 0)], [(0, 1, 2)], camera=camera)
 result = trace(scene, "brute", "{core}", (4, 4))
 extra = {{"secondary", "optics", "shadows", "texture"}}
 assert not loaded() & (extra | {{"lights", "shading"}}), loaded()
@@ -365,33 +483,34 @@ scene.lights = [Light("lamp", "point", (5, 5, 5), (1, 1, 3))]
 result = trace(scene, "brute", "{core}", (4, 4))
 assert not loaded() & extra and "lights" in loaded()
 assert list(result.structures) == ["primary", "shadow"]
-assert not any("rayscope.core.{'pure' if core == 'fast' else 'fast'}" in m for m in sys.modules)
+assert not any("rayscope.core.{"pure" if core == "fast" else "fast"}" in m for m in sys.modules)
 scene.objects[0].materials = (Material(mirror=0.5),)
 result = trace(scene, "brute", "{core}", (4, 4))
 assert "secondary" in loaded() and not loaded() & {{"shadows", "texture"}}
 """
-    path = {"PYTHONPATH": ":".join(p for p in sys.path if p)}
-    root = str(__import__("pathlib").Path(rayscope.core.__file__).parent.parent)
-    alias = f"import importlib.util as u, sys\ns = u.spec_from_file_location('rayscope', {root + '/__init__.py'!r}, " \
-            f"submodule_search_locations=[{root!r}])\nsys.modules['rayscope'] = m = u.module_from_spec(s)\ns.loader.exec_module(m)\n"
-    done = subprocess.run([sys.executable, "-c", alias + code], capture_output=True, text=True, env={**__import__("os").environ, **path})
+    # The package goes by another name than its folder, and need not be installed: conftest.py knows how to import it.
+    tests = Path(rayscope.core.__file__).parent.parent / "tests"
+    code = f"import sys\nsys.path[:0] = {[str(tests), *sys.path]!r}\nimport conftest\n" + code
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
 
 
 def test_png(tmp_path):
     image = np.zeros((2, 3, 4), np.float32)
-    image[0, 0] = (1, 0.5, 0, 1)                                         # bottom left
-    image[1, 2] = (2, -1, np.nan, 0.5)                                   # top right, out of range
+    image[0, 0] = (1, 0.5, 0, 1)  # bottom left
+    image[1, 2] = (2, -1, np.nan, 0.5)  # top right, out of range
     path = tmp_path / "picture.png"
     save_png(path, image)
     data = path.read_bytes()
     assert data[:8] == b"\x89PNG\r\n\x1a\n" and data[16:24] == b"\0\0\0\3\0\0\0\2"
     start = data.index(b"IDAT")
-    length = int.from_bytes(data[start - 4:start], "big")
-    assert zlib.crc32(data[start:start + 4 + length]) == int.from_bytes(data[start + 4 + length:start + 8 + length], "big")
-    rows = np.frombuffer(zlib.decompress(data[start + 4:start + 4 + length]), np.uint8).reshape(2, 13)
+    length = int.from_bytes(data[start - 4 : start], "big")
+    assert zlib.crc32(data[start : start + 4 + length]) == int.from_bytes(
+        data[start + 4 + length : start + 8 + length], "big"
+    )
+    rows = np.frombuffer(zlib.decompress(data[start + 4 : start + 4 + length]), np.uint8).reshape(2, 13)
     assert not rows[:, 0].any()
-    assert rows[1, 1:5].tolist() == [255, 188, 0, 255]                    # the last row of the file is the bottom
+    assert rows[1, 1:5].tolist() == [255, 188, 0, 255]  # the last row of the file is the bottom
     assert rows[0, 9:13].tolist() == [255, 0, 0, 128]
     np.testing.assert_allclose(to_srgb([0.0, 0.0031308, 0.2158605, 1.0]), [0, 0.04045, 0.5019608, 1], atol=1e-5)
     with pytest.raises(RayscopeError, match="cannot be written"):

@@ -1,4 +1,4 @@
-"""What the tracer computes, against formulas: local light, mirrors, refraction, shadows. Every check runs in both cores."""
+"""What the tracer computes, against formulas: local light, mirrors, refraction, shadows. All in both cores."""
 
 import math
 
@@ -23,7 +23,9 @@ def quad(corners, material, uvs=((0, 0), (1, 0), (1, 1), (0, 1)), **more):
 def floor(material, z=0.0, half=10.0, centre=(0.0, 0.0)):
     """A horizontal square that faces up."""
     x, y = centre
-    return quad([(x - half, y - half, z), (x + half, y - half, z), (x + half, y + half, z), (x - half, y + half, z)], material)
+    return quad(
+        [(x - half, y - half, z), (x + half, y - half, z), (x + half, y + half, z), (x - half, y + half, z)], material
+    )
 
 
 def glow(r, g=None, b=None, name="glow"):
@@ -33,7 +35,11 @@ def glow(r, g=None, b=None, name="glow"):
 
 def eye(position, target, width=1e-9, **more):
     """An orthographic camera that looks along one line."""
-    up = (0, 1, 0) if abs(np.subtract(target, position)[2]) > 0.9 * np.linalg.norm(np.subtract(target, position)) else (0, 0, 1)
+    up = (
+        (0, 1, 0)
+        if abs(np.subtract(target, position)[2]) > 0.9 * np.linalg.norm(np.subtract(target, position))
+        else (0, 0, 1)
+    )
     camera = Camera.look_at(position, target, up=up, **more)
     camera.kind, camera.window = "orthographic", (-width / 2, width / 2, -width / 2, width / 2)
     return camera
@@ -49,18 +55,58 @@ LIGHTS = {
     # name: light, cosine at the floor's point (0, 0, 0) and irradiance facing it
     "point": (Light("l", "point", (3, 2, 1), position=(3, 0, 4)), 4 / 5, 1 / 25),
     "point without falloff": (Light("l", "point", (3, 2, 1), position=(3, 0, 4), falloff=False), 4 / 5, 1.0),
-    "point with a radius": (Light("l", "point", (3, 2, 1), position=(3, 0, 4), radius=1.0), 4 / 5, 1 / 26),      # as Cycles has it
+    "point with a radius": (
+        Light("l", "point", (3, 2, 1), position=(3, 0, 4), radius=1.0),
+        4 / 5,
+        1 / 26,
+    ),  # as Cycles has it
     "sun": (Light("l", "sun", (3, 2, 1), direction=(-0.6, 0, -0.8)), 0.8, 1.0),
-    "spot, on the axis": (Light("l", "spot", (3, 2, 1), position=(3, 0, 4), direction=(-0.6, 0, -0.8), spot_angle=0.5), 0.8, 1 / 25),
-    "spot, outside": (Light("l", "spot", (3, 2, 1), position=(3, 0, 4), direction=(0, 0, -1), spot_angle=1.0), 0.8, 0.0),
-    "spot, in the blend": (Light("l", "spot", (3, 2, 1), position=(3, 0, 4), direction=(0, 0, -1),
-                                 spot_angle=2 * math.acos(0.6), spot_blend=1.0), 0.8, 0.5 / 25),     # halfway: 0.8 of 0.6 to 1
-    "area": (Light("l", "area", (3, 2, 1), position=(3, 0, 4), direction=(0, 0, -1), axes=((0.5, 0, 0), (0, 0.25, 0))),
-             0.8, 0.5 * 0.8 / 25),
-    "area, ellipse": (Light("l", "area", (3, 2, 1), position=(3, 0, 4), direction=(0, 0, -1), axes=((0.5, 0, 0), (0, 0.25, 0)),
-                            shape="ellipse"), 0.8, math.pi * 0.125 * 0.8 / 25),
-    "area, from behind": (Light("l", "area", (3, 2, 1), position=(3, 0, 4), direction=(0, 0, 1), axes=((1, 0, 0), (0, 1, 0))),
-                          0.8, 0.0),
+    "spot, on the axis": (
+        Light("l", "spot", (3, 2, 1), position=(3, 0, 4), direction=(-0.6, 0, -0.8), spot_angle=0.5),
+        0.8,
+        1 / 25,
+    ),
+    "spot, outside": (
+        Light("l", "spot", (3, 2, 1), position=(3, 0, 4), direction=(0, 0, -1), spot_angle=1.0),
+        0.8,
+        0.0,
+    ),
+    "spot, in the blend": (
+        Light(
+            "l",
+            "spot",
+            (3, 2, 1),
+            position=(3, 0, 4),
+            direction=(0, 0, -1),
+            spot_angle=2 * math.acos(0.6),
+            spot_blend=1.0,
+        ),
+        0.8,
+        0.5 / 25,
+    ),  # halfway: 0.8 of 0.6 to 1
+    "area": (
+        Light("l", "area", (3, 2, 1), position=(3, 0, 4), direction=(0, 0, -1), axes=((0.5, 0, 0), (0, 0.25, 0))),
+        0.8,
+        0.5 * 0.8 / 25,
+    ),
+    "area, ellipse": (
+        Light(
+            "l",
+            "area",
+            (3, 2, 1),
+            position=(3, 0, 4),
+            direction=(0, 0, -1),
+            axes=((0.5, 0, 0), (0, 0.25, 0)),
+            shape="ellipse",
+        ),
+        0.8,
+        math.pi * 0.125 * 0.8 / 25,
+    ),
+    "area, from behind": (
+        Light("l", "area", (3, 2, 1), position=(3, 0, 4), direction=(0, 0, 1), axes=((1, 0, 0), (0, 1, 0))),
+        0.8,
+        0.0,
+    ),
 }
 
 
@@ -85,7 +131,9 @@ def test_samples_of_a_light_have_the_mean_of_its_centre(core, kind):
 
 @CORES
 def test_highlight(core):
-    material = Material("shiny", base=(0.5, 0.4, 0.3), ambient=0.0, diffuse=0.0, specular=0.7, specular_base=0.5, shininess=20.0)
+    material = Material(
+        "shiny", base=(0.5, 0.4, 0.3), ambient=0.0, diffuse=0.0, specular=0.7, specular_base=0.5, shininess=20.0
+    )
     light = Light("l", "point", (2, 2, 2), position=(0, 0, 2))
     got = seen(core, [floor(material)], eye((3, 0, 4), (0, 0, 0)), [light])
     half = np.array([0.6, 0, 0.8]) + [0, 0, 1]
@@ -98,8 +146,12 @@ def test_highlight(core):
 def test_ambient_emission_and_background(core):
     world = World((0.2, 0.4, 0.6))
     material = Material("m", base=(0.5, 1.0, 0.25), ambient=0.5, diffuse=0.0, emission=(1.0, 2.0, 3.0))
-    np.testing.assert_allclose(seen(core, [floor(material)], eye((0, 0, 5), (0, 0, 0)), world=world), [1.05, 2.2, 3.075], rtol=1e-6)
-    np.testing.assert_allclose(seen(core, [floor(material)], eye((0, 0, 5), (0, 0, 9)), world=world), world.colour, rtol=1e-6)
+    np.testing.assert_allclose(
+        seen(core, [floor(material)], eye((0, 0, 5), (0, 0, 0)), world=world), [1.05, 2.2, 3.075], rtol=1e-6
+    )
+    np.testing.assert_allclose(
+        seen(core, [floor(material)], eye((0, 0, 5), (0, 0, 9)), world=world), world.colour, rtol=1e-6
+    )
 
 
 @CORES
@@ -110,12 +162,17 @@ def test_surroundings_as_in_blender(core):
 
     def looking(along, **more):
         return seen(core, [], eye((0, 0, 0), along), world=World((2.0, 1.0, 1.0), image=image, **more))
+
     east = math.radians(22.5)
     np.testing.assert_allclose(looking((math.cos(east), math.sin(east), 0.1)), pixels[2, 3, :3] * [2, 1, 1], rtol=1e-6)
-    np.testing.assert_allclose(looking((math.cos(east), -math.sin(east), -0.1)), pixels[1, 4, :3] * [2, 1, 1], rtol=1e-6)
+    np.testing.assert_allclose(
+        looking((math.cos(east), -math.sin(east), -0.1)), pixels[1, 4, :3] * [2, 1, 1], rtol=1e-6
+    )
     np.testing.assert_allclose(looking((-1, 0.01, 0.1)), pixels[2, 0, :3] * [2, 1, 1], rtol=1e-6)
     quarter = np.array([[0.0, 1, 0], [-1, 0, 0], [0, 0, 1]])
-    np.testing.assert_allclose(looking((-math.sin(east), math.cos(east), 0.1), rotation=quarter), pixels[2, 3, :3] * [2, 1, 1], rtol=1e-6)
+    np.testing.assert_allclose(
+        looking((-math.sin(east), math.cos(east), 0.1), rotation=quarter), pixels[2, 3, :3] * [2, 1, 1], rtol=1e-6
+    )
 
 
 @CORES
@@ -179,7 +236,9 @@ def test_reflectance_of_its_own(core):
     view = eye((0, 0, 1), (0, 0, 0))
     for reflectance in (0.0, 0.04, 0.5):
         material = Material("m", ambient=0.0, diffuse=0.0, mirror=1.0, fresnel=True, ior=1.5, reflectance=reflectance)
-        np.testing.assert_allclose(seen(core, [floor(material)], view, world=World((1, 1, 1))), [reflectance] * 3, atol=1e-7)
+        np.testing.assert_allclose(
+            seen(core, [floor(material)], view, world=World((1, 1, 1))), [reflectance] * 3, atol=1e-7
+        )
 
 
 @CORES
@@ -204,12 +263,14 @@ def test_slab_displaces_a_ray_by_snells_law(core, ior):
 @CORES
 def test_total_internal_reflection(core):
     """From inside glass, beyond the critical angle, the surface is a perfect mirror; below it, nearly clear."""
-    glass = Material("glass", base=(1, 1, 1), ambient=0.0, diffuse=0.0, mirror=1.0, transmission=1.0, ior=1.5, fresnel=True)
+    glass = Material(
+        "glass", base=(1, 1, 1), ambient=0.0, diffuse=0.0, mirror=1.0, transmission=1.0, ior=1.5, fresnel=True
+    )
     lamp = floor(glow(1.0, 0.0, 0.0), z=-1.0)
     sky = World((0.0, 1.0, 0.0))
     critical = math.asin(1 / 1.5)
     for angle, total in ((critical + 0.001, True), (critical - 0.001, False), (1.3, True), (0.3, False)):
-        view = eye((-math.sin(angle), 0, -math.cos(angle)), (0, 0, 0))     # under the surface, looking up
+        view = eye((-math.sin(angle), 0, -math.cos(angle)), (0, 0, 0))  # under the surface, looking up
         red, green, _ = seen(core, [floor(glass, half=9.0), lamp], view, world=sky)
         assert red + green == pytest.approx(1.0, abs=1e-6)
         assert (green == 0.0) == total
@@ -221,19 +282,21 @@ def test_total_internal_reflection(core):
 
 @CORES
 def test_principled_glass_against_cycles(core):
-    """A glowing floor seen straight down through a sheet and through a box of Principled glass; numbers from Cycles 5.2."""
+    """A glowing floor seen straight down through a sheet and a box of Principled glass; numbers from Cycles 5.2."""
     glass = Material.principled("glass", base=(0.5, 0.8, 0.2), roughness=0.0, transmission=1.0)
     view = eye((0.1, 0.1, 4), (0.1, 0.1, 0))
     box = Object("box", Shapes([solids.box((-0.5, -0.5, 0.5), (0.5, 0.5, 1.5))]), materials=(glass,))
     for thing, cycles in ((floor(glass, 1.0), (0.67642, 0.85561, 0.42781)), (box, (0.45994, 0.73590, 0.18398))):
         got = seen(core, [floor(glow(1.0)), thing], view, depth=2)
-        np.testing.assert_allclose(got, cycles, atol=0.004)         # ours is free of noise: 0.96 sqrt(C), 0.96^2 C
+        np.testing.assert_allclose(got, cycles, atol=0.004)  # ours is free of noise: 0.96 sqrt(C), 0.96^2 C
 
 
 @CORES
 def test_glass_ball_in_a_white_world_loses_nothing(core):
-    """Energy: all that a clear ball sends on adds up to the surroundings' 1, short of what is cut off at the depth limit."""
-    glass = Material("glass", base=(1, 1, 1), ambient=0.0, diffuse=0.0, mirror=1.0, transmission=1.0, ior=1.5, fresnel=True)
+    """Energy: all that a clear ball sends on adds up to the surroundings' 1, but for what the depth limit cuts off."""
+    glass = Material(
+        "glass", base=(1, 1, 1), ambient=0.0, diffuse=0.0, mirror=1.0, transmission=1.0, ior=1.5, fresnel=True
+    )
     ball = Object("ball", Shapes([solids.sphere((0, 0, 0), 1.0)]), materials=(glass,))
     scene = Scene([ball], [], Camera.look_at((0, -3, 0.5), (0, 0, 0), angle=math.radians(45)), World((1, 1, 1)))
     image = trace(scene, "brute", core, size=(9, 9), depth=12).image[..., :3]
@@ -266,13 +329,18 @@ def test_alpha_goes_straight_on_and_is_no_bounce(core):
 def test_alpha_at_a_vertex_at_the_origin(core):
     """All coordinates, and so the error bound, are 0 there; the ray must get away from it all the same."""
     veil = Material("veil", ambient=0.0, diffuse=0.0, alpha=0.5)
-    sheet = Object("veil", Mesh([(0, 0, 0), (1, 0, 0), (0, 1, 0), (-1, 0, 0), (0, -1, 0)],
-                                [(0, 1, 2), (0, 2, 3), (0, 3, 4), (0, 4, 1)]), materials=(veil,))
+    sheet = Object(
+        "veil",
+        Mesh([(0, 0, 0), (1, 0, 0), (0, 1, 0), (-1, 0, 0), (0, -1, 0)], [(0, 1, 2), (0, 2, 3), (0, 3, 4), (0, 4, 1)]),
+        materials=(veil,),
+    )
     camera = eye((0, 0, 5), (0, 0, 0))
     assert seen(core, [sheet, floor(glow(1.0), z=-1.0)], camera)[0] == pytest.approx(0.5)
     sun = Light("sun", "sun", (1, 1, 1), direction=(0, 0, -1))
     below = eye((0, 0, -0.5), (0, 0, -1))
-    free, shaded = (seen(core, objects, below, [sun])[0] for objects in ([floor(LAMBERT, -1.0)], [sheet, floor(LAMBERT, -1.0)]))
+    free, shaded = (
+        seen(core, objects, below, [sun])[0] for objects in ([floor(LAMBERT, -1.0)], [sheet, floor(LAMBERT, -1.0)])
+    )
     assert shaded == pytest.approx(0.5 * free)
 
 
@@ -299,6 +367,7 @@ def test_textures_bilinear_closest_and_beyond_the_edges(core):
         uvs = [(u - 1, v - 1), (u + 1, v - 1), (u + 1, v + 1), (u - 1, v + 1)]
         sheet = quad([(-1, -1, 0), (1, -1, 0), (1, 1, 0), (-1, 1, 0)], material, uvs)
         return seen(core, [sheet], eye((0, 0, 5), (0, 0, 0)), world=world)[0]
+
     assert at(0.3, 0.3, "closest", "repeat") == 1
     assert at(0.3, 0.8, "closest", "repeat") == 5
     assert at(-0.1, 0.3, "closest", "repeat") == 3
@@ -308,18 +377,25 @@ def test_textures_bilinear_closest_and_beyond_the_edges(core):
     assert at(1.3, 1.8, "closest", "repeat") == 5
     assert at(0.25, 0.25, "linear", "repeat") == pytest.approx(0.5, abs=1e-6)
     assert at(0.5, 0.5, "linear", "repeat") == pytest.approx(3.5, abs=1e-6)
-    assert at(0.0, 0.25, "linear", "repeat") == pytest.approx(1.5, abs=1e-6)        # between 3 and 0
+    assert at(0.0, 0.25, "linear", "repeat") == pytest.approx(1.5, abs=1e-6)  # between 3 and 0
     assert at(0.0, 0.25, "linear", "extend") == pytest.approx(0.0, abs=1e-6)
     assert at(1.2, 0.25, "linear", "extend") == pytest.approx(3.0, abs=1e-6)
     assert at(1.2, 0.25, "linear", "clip") == 0
-    assert at(0.05, 0.1, "closest", "repeat", np.array([[2.0, 0, 0.25], [0, 1, 0.5]])) == 5     # (0.35, 0.6)
+    assert at(0.05, 0.1, "closest", "repeat", np.array([[2.0, 0, 0.25], [0, 1, 0.5]])) == 5  # (0.35, 0.6)
 
 
 @CORES
 def test_texture_alpha_cuts_out(core):
     pixels = np.ones((1, 2, 4), np.float32)
     pixels[0, 0, 3] = 0.0
-    leaf = Material("leaf", ambient=0.0, diffuse=0.0, emission=(0, 1, 0), texture=Image("leaf", pixels, "closest"), texture_alpha=True)
+    leaf = Material(
+        "leaf",
+        ambient=0.0,
+        diffuse=0.0,
+        emission=(0, 1, 0),
+        texture=Image("leaf", pixels, "closest"),
+        texture_alpha=True,
+    )
     scene = [quad([(-1, -1, 1), (1, -1, 1), (1, 1, 1), (-1, 1, 1)], leaf), floor(glow(1, 0, 0))]
     np.testing.assert_array_equal(seen(core, scene, eye((-0.5, 0, 5), (-0.5, 0, 0))), [1, 0, 0])
     np.testing.assert_array_equal(seen(core, scene, eye((0.5, 0, 5), (0.5, 0, 0))), [0, 1, 0])
@@ -351,12 +427,16 @@ def test_smooth_normals_follow_a_squashed_mirrored_object(core):
 @pytest.mark.parametrize("size", [1e-6, 1.0, 1e7])
 @pytest.mark.parametrize("offset", [0.0, 1e3])
 def test_no_acne_at_any_scale(core, size, offset):
-    """A bumpy closed surface lit by the sun: what faces the sun is lit by the formula everywhere, never shadowed by itself."""
+    """A bumpy closed surface lit by the sun: it is lit by the formula everywhere, never shadowed by itself."""
     rng = np.random.default_rng(3)
     n = 6
     grid = np.stack(np.meshgrid(np.arange(n + 1.0), np.arange(n + 1.0)), -1).reshape(-1, 2)
     vertices = np.column_stack([grid / n - 0.5, 0.02 * rng.random(len(grid))])
-    rows = [(i + j * (n + 1), i + 1 + j * (n + 1), i + 1 + (j + 1) * (n + 1), i + (j + 1) * (n + 1)) for i in range(n) for j in range(n)]
+    rows = [
+        (i + j * (n + 1), i + 1 + j * (n + 1), i + 1 + (j + 1) * (n + 1), i + (j + 1) * (n + 1))
+        for i in range(n)
+        for j in range(n)
+    ]
     triangles = [t for a, b, c, d in rows for t in ((a, b, c), (a, c, d))]
     place = np.array([offset, -offset, offset]) * size
     mesh = Mesh(vertices * size + place, triangles)
@@ -377,6 +457,7 @@ def test_smooth_terminator_leaves_no_edge(core):
     def lit(elevation):
         sun = Light("s", "sun", (1, 1, 1), direction=(-math.cos(elevation), 0, -math.sin(elevation)))
         return seen(core, scene, eye((0.8, 0, 1), (0.8, 0, 0)), [sun])[0]
+
     assert lit(-0.01) == 0.0
     assert 0.0 < lit(0.002) < 0.01 < lit(0.3)
 
@@ -393,8 +474,9 @@ def test_soft_shadow_is_the_visible_share_of_the_light(core):
     np.testing.assert_allclose(half / free, 0.5, atol=0.12)
     for kind in ("point", "spot", "sun"):
         lamp = Light("l", kind, (1.0,) * 3, position=(0, 0, 4), direction=(0, 0, -1), radius=0.2)
-        share = (seen(core, [floor(LAMBERT), screen], view, [lamp], samples=256)
-                 / seen(core, [floor(LAMBERT)], view, [lamp], samples=1))
+        share = seen(core, [floor(LAMBERT), screen], view, [lamp], samples=256) / seen(
+            core, [floor(LAMBERT)], view, [lamp], samples=1
+        )
         np.testing.assert_allclose(share, 0.5, atol=0.12)
 
 
@@ -404,13 +486,17 @@ def test_a_lamp_in_the_plane_of_the_ceiling_shines(core, glassy):
     """Rounding decides nowhere whether the ceiling is before or behind the lamp: all of the floor is lit."""
     z = 2.7100000000000004
     ceiling = quad([(-9.1, -9.3, z), (-9.1, 9.7, z), (9.9, 9.7, z), (9.9, -9.3, z)], LAMBERT)
-    lamps = [Light("point", "point", (1, 1, 1), position=(0.37, 0.11, z)),
-             Light("area", "area", (1, 1, 1), position=(0.1, 0.2, z), axes=((0.3, 0, 0), (0, 0.3, 0)))]
+    lamps = [
+        Light("point", "point", (1, 1, 1), position=(0.37, 0.11, z)),
+        Light("area", "area", (1, 1, 1), position=(0.1, 0.2, z), axes=((0.3, 0, 0), (0, 0.3, 0))),
+    ]
     camera = eye((0.3, 0.1, 2), (0.3, 0.1, 0), width=8.0)
     # Glass anywhere in the scene makes shadow rays go another way.
     extra = [floor(Material("glass", transmission=1.0), z=-5.0)] if glassy else []
     for lamp in lamps:
         scene = Scene([floor(LAMBERT), ceiling, *extra], [lamp], camera, DARK)
         lit = trace(scene, "brute", core, size=(12, 12), samples=2).image[..., 0]
-        without = trace(Scene([floor(LAMBERT), *extra], [lamp], camera, DARK), "brute", core, size=(12, 12), samples=2).image[..., 0]
+        without = trace(
+            Scene([floor(LAMBERT), *extra], [lamp], camera, DARK), "brute", core, size=(12, 12), samples=2
+        ).image[..., 0]
         np.testing.assert_allclose(lit, without, rtol=1e-6)

@@ -50,7 +50,7 @@ def arriving(light, point, u=None, v=None):
         elif soft:
             irradiance = np.sqrt(squared) / dot(to, to) ** 1.5
         else:
-            irradiance = 1.0 / (squared + light.radius * light.radius)        # the mean of the above over the disc
+            irradiance = 1.0 / (squared + light.radius * light.radius)  # the mean of the above over the disc
         if light.kind == "spot":
             irradiance = irradiance * cone(light, -dot(axial, axis) / np.sqrt(squared))
     irradiance = np.where(squared > 0.0, irradiance, 0.0)

@@ -1,4 +1,4 @@
-"""Asking a structure, in pieces short enough that progress can be shown and a run stopped, and counting what it cost."""
+"""Asking a structure, in pieces so short that progress can be shown and a run stopped; counting what it cost."""
 
 import time
 from dataclasses import fields
@@ -29,9 +29,17 @@ class Probe:
 
     def closest(self, o, d, t_min, t_max):
         """Hits of rays given as columns."""
+
         def ask(s):
-            return self.structure.closest(o[:, s].T, d[:, s].T, t_min=_part(t_min, s), t_max=_part(t_max, s),
-                                          count=self.count, progress=self._progress)
+            return self.structure.closest(
+                o[:, s].T,
+                d[:, s].T,
+                t_min=_part(t_min, s),
+                t_max=_part(t_max, s),
+                count=self.count,
+                progress=self._progress,
+            )
+
         parts = self._in_pieces(o.shape[1], ask)
         if len(parts) == 1:
             return parts[0]
@@ -40,10 +48,13 @@ class Probe:
 
     def occluded(self, o, d, t_max):
         """Bool per ray, and the counts."""
+
         def ask(s):
-            answer = self.structure.occluded(o[:, s].T, d[:, s].T, t_max=_part(t_max, s), count=self.count,
-                                             progress=self._progress)
+            answer = self.structure.occluded(
+                o[:, s].T, d[:, s].T, t_max=_part(t_max, s), count=self.count, progress=self._progress
+            )
             return answer if self.count else (answer, {})
+
         parts = self._in_pieces(o.shape[1], ask)
         counts = {name: np.concatenate([c[name] for _, c in parts]) for name in (COUNTED if self.count else ())}
         return np.concatenate([blocked for blocked, _ in parts]), counts

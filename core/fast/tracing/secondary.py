@@ -41,7 +41,9 @@ def mirrored_and_refracted(table, surface, d):
     by_angle = table.fresnel[m] > 0.0
     total, tint = cosine_t <= 0.0, table.tint(surface)
     let_in = transmission * np.where(by_angle, 1.0 - dielectric, np.where(total, 0.0, 1.0)) * tint
-    sent_back = (table.mirror[m] * np.where(by_angle, dielectric, 1.0) + table.mirror_base[m] * surface.base
-                 + np.where(total & ~by_angle, transmission, 0.0) * tint)
+    sent_back = (
+        table.mirror[m] * np.where(by_angle, dielectric, 1.0)
+        + table.mirror_base[m] * surface.base
+        + np.where(total & ~by_angle, transmission, 0.0) * tint
+    )
     return (off, surface.alpha * sent_back), (into, surface.alpha * let_in)
-

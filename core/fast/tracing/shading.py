@@ -45,7 +45,9 @@ def lit(table, surface, d, lights, transmitted, key, check):
         m, base = surface.material[which], surface.base[:, which]
         half = unit(towards[:, which] - view[:, which])
         highlight = np.maximum(dot(surface.shading[:, which], half), 0.0) ** table.shininess[m]
-        reflected = (table.diffuse[m] * cosine[which]) * base + highlight * (table.specular[m] + table.specular_base[m] * base)
+        reflected = (table.diffuse[m] * cosine[which]) * base + highlight * (
+            table.specular[m] + table.specular_base[m] * base
+        )
         # Mirrors and glass reflect little but their narrow highlights: no shadow ray where there is nothing to shade.
         some = np.flatnonzero(reflected.any(axis=0))
         which, reflected = which[some], reflected[:, some]
@@ -53,7 +55,9 @@ def lit(table, surface, d, lights, transmitted, key, check):
             continue
         arrives = irradiance[which] / math.pi
         if surface.shading is not surface.normal:
-            arrives = arrives * terminator(cosine[which], flat[which], dot(surface.normal[:, which], surface.shading[:, which]))
+            arrives = arrives * terminator(
+                cosine[which], flat[which], dot(surface.normal[:, which], surface.shading[:, which])
+            )
         if light.shadows:
             arrives = arrives * transmitted(surface, which, to[:, which], reach)
         total[:, which] += reflected * arrives * np.array(light.colour, float)[:, None]

@@ -9,8 +9,22 @@ from ...scene.scene import Mesh
 from ...scene.solids import slots
 from .vectors import dot, unit
 
-_SCALARS = ("ambient", "diffuse", "specular", "specular_base", "shininess", "mirror", "mirror_base", "transmission", "transmission_exponent",
-            "ior", "fresnel", "alpha", "texture_alpha", "vertex_colours")
+_SCALARS = (
+    "ambient",
+    "diffuse",
+    "specular",
+    "specular_base",
+    "shininess",
+    "mirror",
+    "mirror_base",
+    "transmission",
+    "transmission_exponent",
+    "ior",
+    "fresnel",
+    "alpha",
+    "texture_alpha",
+    "vertex_colours",
+)
 
 
 class Materials:
@@ -28,9 +42,10 @@ class Materials:
     def __init__(self, materials):
         for name in _SCALARS:
             setattr(self, name, np.array([float(getattr(m, name)) for m in materials]))
-        self.base, self.emission = (np.array([getattr(m, name)[:3] for m in materials], float).T
-                                    for name in ("base", "emission"))
-        self.ior = np.clip(self.ior, 1e-3, 1e3)       # Fresnel's equations need both it and its inverse
+        self.base, self.emission = (
+            np.array([getattr(m, name)[:3] for m in materials], float).T for name in ("base", "emission")
+        )
+        self.ior = np.clip(self.ior, 1e-3, 1e3)  # Fresnel's equations need both it and its inverse
         self.reflectance = np.array([m.reflectance_at_normal() for m in materials])
         images = {id(m.texture): m.texture for m in materials if m.texture is not None}
         self.textures = [(image, np.array([m.texture is image for m in materials])) for image in images.values()]
@@ -70,9 +85,16 @@ class Surface:
     def take(self, which):
         """Some of the surfaces."""
         normal = self.normal[:, which]
-        return Surface(self.point[:, which], self.error[which], normal,
-                       normal if self.shading is self.normal else self.shading[:, which], self.outside[which],
-                       self.material[which], self.base[:, which], self.alpha[which])
+        return Surface(
+            self.point[:, which],
+            self.error[which],
+            normal,
+            normal if self.shading is self.normal else self.shading[:, which],
+            self.outside[which],
+            self.material[which],
+            self.base[:, which],
+            self.alpha[which],
+        )
 
 
 class Corners:
@@ -132,7 +154,8 @@ class Surfaces:
         materials = materials or [Material()]
         self.table = Materials(materials)
         self._palette, self._palette_start, self._palette_last = (
-            np.array(a, np.int64) for a in (palette, palette_start, palette_last))
+            np.array(a, np.int64) for a in (palette, palette_start, palette_last)
+        )
         self._slots = _Slots(objects) if max(palette_last, default=0) else None
         self._normals = Corners(objects, "corner_normals")
         self._to_world = _cofactors(objects) if self._normals.values is not None else None
@@ -161,8 +184,16 @@ class Surfaces:
         outside = dot(d, normal) <= 0.0
         normal *= np.where(outside, 1.0, -1.0)
         base, alpha = self._colour(material, obj, primitive, u, v)
-        return Surface(np.ascontiguousarray(hits.point[which].T), hits.error[which], normal,
-                       self._smooth(normal, obj, primitive, u, v), outside, material, base, alpha)
+        return Surface(
+            np.ascontiguousarray(hits.point[which].T),
+            hits.error[which],
+            normal,
+            self._smooth(normal, obj, primitive, u, v),
+            outside,
+            material,
+            base,
+            alpha,
+        )
 
     def _material(self, obj, primitive, part):
         """Number of the material."""
@@ -175,6 +206,7 @@ class Surfaces:
         base, alpha = table.base[:, material], table.alpha[material]
         if table.textures:
             from .texture import lookup
+
             # Analytic solids bring their own coordinates; a mesh without any has (0, 0), as in Blender.
             analytic = ~self._mesh[obj]
             s, t = np.where(analytic, u, 0.0), np.where(analytic, v, 0.0)
@@ -199,8 +231,9 @@ class Surfaces:
         if not len(which):
             return normal
         m = self._to_world[:, obj[which]]
-        smooth = unit(np.stack([m[3 * r] * smooth[0] + m[3 * r + 1] * smooth[1] + m[3 * r + 2] * smooth[2]
-                                for r in range(3)]))
+        smooth = unit(
+            np.stack([m[3 * r] * smooth[0] + m[3 * r + 1] * smooth[1] + m[3 * r + 2] * smooth[2] for r in range(3)])
+        )
         shading = normal.copy()
         side = dot(smooth, normal[:, which])
         # A normal of length zero, or at right angles to the triangle, says nothing.
@@ -210,7 +243,7 @@ class Surfaces:
 
 
 class _Slots:
-    """Material slots of all objects' primitives, in one array: an object has a place, a primitive a row, a part a column."""
+    """Material slots of all objects' primitives, in one array: a row a primitive, a column a part."""
 
     def __init__(self, objects):
         flat, row, rows, width = [np.zeros(1, np.int64)], {}, 1, {}
@@ -225,7 +258,7 @@ class _Slots:
                     lists = [slots(s) for s in g.solids]
                     own = np.zeros((len(lists), max(map(len, lists), default=1)), np.int64)
                     for k, values in enumerate(lists):
-                        own[k, :len(values)] = values
+                        own[k, : len(values)] = values
                 row[id(g)], width[id(g)] = (0, 0) if own is None else (rows, own.shape[1])
                 if own is not None:
                     flat.append(own.ravel())

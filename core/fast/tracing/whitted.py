@@ -60,9 +60,13 @@ class Wave:
         """One wave from several."""
         if len(waves) == 1:
             return waves[0]
-        return cls(*(np.concatenate([getattr(w, name) for w in waves], axis=-1) for name in
-                     ("o", "d", "t_max", "weight", "pixel", "depth", "kind")),
-                   None if waves[0].key is None else np.concatenate([w.key for w in waves]))
+        return cls(
+            *(
+                np.concatenate([getattr(w, name) for w in waves], axis=-1)
+                for name in ("o", "d", "t_max", "weight", "pixel", "depth", "kind")
+            ),
+            None if waves[0].key is None else np.concatenate([w.key for w in waves]),
+        )
 
 
 class Whitted:
@@ -93,7 +97,14 @@ class Whitted:
     tile_side = TILE
 
     def __init__(self, scene, structures, size, depth, samples, seed, count, check):
-        self.scene, self.size, self.depth, self.samples, self.seed, self.count = scene, size, depth, samples, seed, count
+        self.scene, self.size, self.depth, self.samples, self.seed, self.count = (
+            scene,
+            size,
+            depth,
+            samples,
+            seed,
+            count,
+        )
         self.check = check
         probes = {id(s): Probe(s, check, count) for s in structures.values()}
         self.probe = {kind: probes[id(s)] for kind, s in structures.items()}
@@ -114,8 +125,8 @@ class Whitted:
         Returns
         -------
         dict
-            Arrays with one entry a pixel, row by row from the bottom: ``combined`` (n, 3), ``rays_per_pixel``, ``n_it`` and
-            ``n_ts`` where counted; for sample 0 also ``depth``, ``normal``, ``position``, ``object_index`` and
+            Arrays with one entry a pixel, row by row from the bottom: ``combined`` (n, 3), ``rays_per_pixel``, ``n_it``
+            and ``n_ts`` where counted; for sample 0 also ``depth``, ``normal``, ``position``, ``object_index`` and
             ``primitive_index``.
         """
         pixels = (np.arange(y0, y1)[:, None] * self.size[0] + np.arange(x0, x1)).ravel()
@@ -123,11 +134,23 @@ class Whitted:
         key = sampling.first_key(pixels, sample, self.seed) if self.samples > 1 else None
         o, d = primary(self.scene.camera, self.size, pixels, key)
         self.radiance = np.zeros((3, n))
-        self.per_pixel = {name: np.zeros(n, np.int64) for name in
-                          ("rays_per_pixel", *(("n_it", "n_ts") if self.count else ()))}
+        self.per_pixel = {
+            name: np.zeros(n, np.int64) for name in ("rays_per_pixel", *(("n_it", "n_ts") if self.count else ()))
+        }
         camera = self.scene.camera
-        stack = [Wave(o, d, np.full(n, float(camera.far)), np.ones((3, n)), np.arange(n), np.zeros(n, np.int32),
-                      np.full(n, PRIMARY, np.uint8), key if self.soft else None, t_min=float(camera.near))]
+        stack = [
+            Wave(
+                o,
+                d,
+                np.full(n, float(camera.far)),
+                np.ones((3, n)),
+                np.arange(n),
+                np.zeros(n, np.int32),
+                np.full(n, PRIMARY, np.uint8),
+                key if self.soft else None,
+                t_min=float(camera.near),
+            )
+        ]
         out = {}
         while stack:
             wave = self._next(stack)
@@ -159,8 +182,12 @@ class Whitted:
         hits = self.probe["primary" if first else "secondary"].closest(wave.o, wave.d, wave.t_min, wave.t_max)
         for kind in (PRIMARY,) if first else (REFLECTED, REFRACTED, TRANSPARENT):
             which = slice(None) if first else np.flatnonzero(wave.kind == kind)
-            self._count(kind, wave.pixel[which], np.count_nonzero(hits.primitive[which] >= 0),
-                        {name: getattr(hits, name)[which] for name in COUNTED} if self.count else {})
+            self._count(
+                kind,
+                wave.pixel[which],
+                np.count_nonzero(hits.primitive[which] >= 0),
+                {name: getattr(hits, name)[which] for name in COUNTED} if self.count else {},
+            )
         return hits
 
     def _count(self, kind, pixel, n_hits, counts):
@@ -179,8 +206,13 @@ class Whitted:
         """The passes that show what the primary rays met."""
         normal = np.zeros((len(hits), 3))
         normal[met] = surface.shading.T
-        return {"depth": hits.t, "normal": normal, "position": hits.point,
-                "object_index": hits.object, "primitive_index": hits.primitive}
+        return {
+            "depth": hits.t,
+            "normal": normal,
+            "position": hits.point,
+            "object_index": hits.object,
+            "primitive_index": hits.primitive,
+        }
 
     def _shade(self, wave, hits, met, surface):
         """Add what rays see: the sky, or emission, ambient and local light."""
@@ -193,10 +225,18 @@ class Whitted:
         seen = table.emission[:, m] + self.ambient[:, None] * (table.ambient[m] * surface.base)
         if self.lights:
             from .shading import lit
+
             key = None if wave.key is None else wave.key[met]
             pixel = wave.pixel[met]
-            seen += lit(table, surface, wave.d[:, met], self.lights,
-                        lambda s, which, to, reach: self._transmitted(s, which, to, reach, pixel), key, self.check)
+            seen += lit(
+                table,
+                surface,
+                wave.d[:, met],
+                self.lights,
+                lambda s, which, to, reach: self._transmitted(s, which, to, reach, pixel),
+                key,
+                self.check,
+            )
         self._add(wave.pixel[met], wave.weight[:, met] * surface.alpha * seen)
 
     def _add(self, pixel, radiance):
@@ -212,6 +252,7 @@ class Whitted:
         if world.image is None:
             return np.broadcast_to(colour, d.shape)
         from .texture import surroundings
+
         d = unit(d)
         if world.rotation is not None:
             d = np.stack([dot(row, d) for row in np.asarray(world.rotation, float)])
@@ -223,7 +264,8 @@ class Whitted:
         o = pushed(point, surface.error[which], surface.normal[:, which], to)
         d = to
         if math.isfinite(reach):
-            # The ray starts beside the point, and must still end at the light; a surface that the light lies in does not shade it.
+            # The ray starts beside the point, and must still end at the light.
+            # A surface that the light lies in does not shade it.
             d = to + (point - o)
             reach = np.maximum(1.0 - self.rounding / np.abs(d).max(axis=0), 0.0)
         pixel = pixel[which]
@@ -235,9 +277,14 @@ class Whitted:
 
         def closest(which, o, d, t_max):
             hits = self.probe["shadow"].closest(o, d, 0.0, t_max)
-            self._count(SHADOW, pixel[which], np.count_nonzero(hits.primitive >= 0),
-                        {name: getattr(hits, name) for name in COUNTED} if self.count else {})
+            self._count(
+                SHADOW,
+                pixel[which],
+                np.count_nonzero(hits.primitive >= 0),
+                {name: getattr(hits, name) for name in COUNTED} if self.count else {},
+            )
             return hits
+
         return filtered(closest, self.surfaces, o, d, reach)
 
     def _onward(self, wave, hits, met, surface):
@@ -248,18 +295,22 @@ class Whitted:
         if self.transparent:
             # Going straight on is no bounce: a leaf's cut-out corner must not use up the depth.
             share = np.broadcast_to(1.0 - surface.alpha, surface.base.shape)
-            waves.append(self._spawn(wave, met, surface, TRANSPARENT, wave.d[:, met], share,
-                                     wave.t_max[met] - hits.t[met]))
+            waves.append(
+                self._spawn(wave, met, surface, TRANSPARENT, wave.d[:, met], share, wave.t_max[met] - hits.t[met])
+            )
         if self.bounces:
             from .secondary import mirrored_and_refracted
+
             table, m = self.surfaces.table, surface.material
             sends = (table.mirror[m] > 0.0) | (table.mirror_base[m] > 0.0) | (table.transmission[m] > 0.0)
             some = np.flatnonzero(sends & (wave.depth[met] < self.depth))
             if len(some):
                 part = surface.take(some)
                 both = mirrored_and_refracted(table, part, wave.d[:, met[some]])
-                waves += [self._spawn(wave, met[some], part, kind, direction, weight, np.full(len(some), math.inf))
-                          for kind, (direction, weight) in zip((REFLECTED, REFRACTED), both)]
+                waves += [
+                    self._spawn(wave, met[some], part, kind, direction, weight, np.full(len(some), math.inf))
+                    for kind, (direction, weight) in zip((REFLECTED, REFRACTED), both)
+                ]
         return [w for w in waves if len(w)]
 
     @staticmethod
@@ -272,6 +323,13 @@ class Whitted:
         moved = np.flatnonzero((o != wave.o[:, met[which]]).any(axis=0))
         which, o = which[moved], o[:, moved]
         ray = met[which]
-        return Wave(o, direction[:, which], t_max[which], weight[:, which], wave.pixel[ray],
-                    wave.depth[ray] + (kind != TRANSPARENT), np.full(len(ray), kind, np.uint8),
-                    None if wave.key is None else sampling.branch(wave.key[ray], kind))
+        return Wave(
+            o,
+            direction[:, which],
+            t_max[which],
+            weight[:, which],
+            wave.pixel[ray],
+            wave.depth[ray] + (kind != TRANSPARENT),
+            np.full(len(ray), kind, np.uint8),
+            None if wave.key is None else sampling.branch(wave.key[ray], kind),
+        )

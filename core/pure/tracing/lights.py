@@ -49,7 +49,7 @@ def arriving(light, point, u=None, v=None):
     elif soft:
         irradiance = math.sqrt(squared) / dot(to, to) ** 1.5
     else:
-        irradiance = 1.0 / (squared + light.radius * light.radius)        # the mean of the above over the disc
+        irradiance = 1.0 / (squared + light.radius * light.radius)  # the mean of the above over the disc
     irradiance *= share
     return to, 1.0, unit(to), irradiance
 

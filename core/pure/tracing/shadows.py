@@ -46,5 +46,5 @@ def filtered(closest, surfaces, o, d, reach):
             break
         before, o, reach = o, pushed(surface.point, surface.error, surface.normal, d), reach - hit.t
         if o == before:
-            break       # it would go on for ever
+            break  # it would go on for ever
     return colour

@@ -73,6 +73,7 @@ class Surfaces:
         base, alpha = tuple(map(float, material.base[:3])), material.alpha
         if material.texture is not None:
             from .texture import lookup
+
             # Analytic solids bring their own coordinates; a mesh without any has (0, 0), as in Blender.
             uv = _interpolated(geometry, "corner_uvs", hit)
             if uv is None:

@@ -48,8 +48,7 @@ def frame(n):
     sign = math.copysign(1.0, n[2])
     a = -1.0 / (sign + n[2])
     b = n[0] * n[1] * a
-    return ((1.0 + sign * n[0] * n[0] * a, sign * b, -sign * n[0]),
-            (b, sign + n[1] * n[1] * a, -n[1]))
+    return ((1.0 + sign * n[0] * n[0] * a, sign * b, -sign * n[0]), (b, sign + n[1] * n[1] * a, -n[1]))
 
 
 def pushed(point, error, normal, direction):

@@ -1,8 +1,8 @@
 """Whitted's ray tracer (1980), one ray at a time.
 
 What a ray sees is the surface's emission, ambient and local light, plus the weighted radiance of the reflected, the
-refracted and the transparent ray. Whitted wrote that as a recursion; here the rays still to be traced wait on a stack with
-the weight that they have in the pixel. The sum is the same, and two facing mirrors cannot exhaust Python's stack.
+refracted and the transparent ray. Whitted wrote that as a recursion; here the rays still to be traced wait on a stack
+with the weight that they have in the pixel. The sum is the same, and two facing mirrors cannot exhaust Python's stack.
 
 Modules for lights, glass, mirrors and textures are imported only for a scene that has any.
 """
@@ -80,7 +80,14 @@ class Whitted:
     tile_side = TILE
 
     def __init__(self, scene, structures, size, depth, samples, seed, count, check):
-        self.scene, self.size, self.depth, self.samples, self.seed, self.count = scene, size, depth, samples, seed, count
+        self.scene, self.size, self.depth, self.samples, self.seed, self.count = (
+            scene,
+            size,
+            depth,
+            samples,
+            seed,
+            count,
+        )
         self.check = check
         self.probe = {kind: Probe(s, count) for kind, s in structures.items()}
         self.surfaces = Surfaces(scene)
@@ -91,7 +98,11 @@ class Whitted:
         self.transparent = any(m.transparent for m in materials)
         self.coloured_shadows = self.transparent or any(m.refracts for m in materials)
         self.lights = [light for light in scene.lights if any(light.colour)]
-        self.rounding = ROUNDING * max(abs(x) for corner in scene.bounds() for x in corner.tolist()) if "shadow" in structures else 0.0
+        self.rounding = (
+            ROUNDING * max(abs(x) for corner in scene.bounds() for x in corner.tolist())
+            if "shadow" in structures
+            else 0.0
+        )
         self.soft = samples > 1 and any(light.has_extent for light in self.lights)
 
     def tile(self, x0, y0, x1, y1, sample):
@@ -100,8 +111,9 @@ class Whitted:
         Returns
         -------
         dict
-            Lists with one entry a pixel, row by row from the bottom: ``combined``, ``rays_per_pixel``, ``n_it`` and ``n_ts``
-            where counted; for sample 0 also ``depth``, ``normal``, ``position``, ``object_index`` and ``primitive_index``.
+            Lists with one entry a pixel, row by row from the bottom: ``combined``, ``rays_per_pixel``, ``n_it`` and
+            ``n_ts`` where counted; for sample 0 also ``depth``, ``normal``, ``position``, ``object_index`` and
+            ``primitive_index``.
         """
         out = {}
         for y in range(y0, y1):
@@ -117,7 +129,9 @@ class Whitted:
         self.spent = dict.fromkeys(("rays_per_pixel", *(("n_it", "n_ts") if self.count else ())), 0)
         camera = self.scene.camera
         radiance, first = (0.0, 0.0, 0.0), None
-        stack = [Path(o, d, float(camera.near), float(camera.far), (1.0, 1.0, 1.0), 0, PRIMARY, key if self.soft else None)]
+        stack = [
+            Path(o, d, float(camera.near), float(camera.far), (1.0, 1.0, 1.0), 0, PRIMARY, key if self.soft else None)
+        ]
         while stack:
             path = stack.pop()
             hit = self._closest(path.kind, path.o, path.d, path.t_min, path.t_max)
@@ -155,10 +169,20 @@ class Whitted:
     def _first(hit, surface):
         """The passes that show what the primary ray met."""
         if hit is None:
-            return {"depth": math.inf, "normal": (0.0, 0.0, 0.0), "position": (0.0, 0.0, 0.0),
-                    "object_index": -1, "primitive_index": -1}
-        return {"depth": hit.t, "normal": surface.shading, "position": hit.point,
-                "object_index": hit.object, "primitive_index": hit.primitive}
+            return {
+                "depth": math.inf,
+                "normal": (0.0, 0.0, 0.0),
+                "position": (0.0, 0.0, 0.0),
+                "object_index": -1,
+                "primitive_index": -1,
+            }
+        return {
+            "depth": hit.t,
+            "normal": surface.shading,
+            "position": hit.point,
+            "object_index": hit.object,
+            "primitive_index": hit.primitive,
+        }
 
     def _seen(self, surface, d, key):
         """What a surface sends along the ray by itself: emission, ambient and local light."""
@@ -166,6 +190,7 @@ class Whitted:
         seen = add(material.emission, mul(self.ambient, times(material.ambient, surface.base)))
         if self.lights:
             from .shading import lit
+
             seen = add(seen, lit(surface, d, self.lights, self._transmitted, key))
         return seen
 
@@ -176,6 +201,7 @@ class Whitted:
         if world.image is None:
             return colour
         from .texture import surroundings
+
         d = unit(d)
         if world.rotation is not None:
             d = tuple(dot(tuple(map(float, row)), d) for row in world.rotation)
@@ -186,7 +212,8 @@ class Whitted:
         o = pushed(surface.point, surface.error, surface.normal, to)
         d = to
         if math.isfinite(reach):
-            # The ray starts beside the point, and must still end at the light; a surface that the light lies in does not shade it.
+            # The ray starts beside the point, and must still end at the light.
+            # A surface that the light lies in does not shade it.
             d = add(to, minus(surface.point, o))
             reach = max(1.0 - self.rounding / max(map(abs, d)), 0.0)
         if not self.coloured_shadows:
@@ -194,6 +221,7 @@ class Whitted:
             self._count(SHADOW, blocked, counter)
             return (0.0, 0.0, 0.0) if blocked else (1.0, 1.0, 1.0)
         from .shadows import filtered
+
         return filtered(lambda o, d, t_max: self._closest(SHADOW, o, d, 0.0, t_max), self.surfaces, o, d, reach)
 
     def _onward(self, path, hit, surface):
@@ -203,6 +231,7 @@ class Whitted:
             yield from self._spawn(path, surface, TRANSPARENT, path.d, (1.0 - surface.alpha,) * 3, path.t_max - hit.t)
         if self.bounces and surface.material.reflects and path.depth < self.depth:
             from .secondary import mirrored_and_refracted
+
             for kind, (direction, share) in zip((REFLECTED, REFRACTED), mirrored_and_refracted(surface, path.d)):
                 yield from self._spawn(path, surface, kind, direction, share, math.inf)
 
@@ -213,5 +242,13 @@ class Whitted:
         o = pushed(surface.point, surface.error, surface.normal, direction)
         # A ray that gets no further would go on for ever.
         if max(weight) > 0.0 and t_max >= 0.0 and o != path.o:
-            yield Path(o, direction, 0.0, t_max, weight, path.depth + (kind != TRANSPARENT), kind,
-                       None if path.key is None else sampling.branch(path.key, kind))
+            yield Path(
+                o,
+                direction,
+                0.0,
+                t_max,
+                weight,
+                path.depth + (kind != TRANSPARENT),
+                kind,
+                None if path.key is None else sampling.branch(path.key, kind),
+            )
