@@ -37,18 +37,25 @@ class Grid(Structure):
         How far primitives outside a cell are still listed in it.
     """
 
+    NAME = "grid"
+
     def build(self, progress, walk, rule, density, resolution, mailbox, lists):
         self._lay_out(rule, density, resolution)
-        cell, item = self._entries(progress)
+        self._list(*self._entries(progress), lists)
+
+    def _list(self, cell, item, lists):
+        """Make the cells' lists of pairs, and fill in the figures."""
         self.lists = Lists(cell, item, math.prod(self.resolution.tolist()), lists == "shared")
         self._measure()
 
-    def _lay_out(self, rule, density, resolution):
-        """Choose resolution and box."""
+    def _lay_out(self, rule, density, resolution, flat=None):
+        """Choose resolution and box; a `flat` axis is not divided."""
         p = self.primitives
         lo, hi = p.lo.min(axis=0), p.hi.max(axis=0)
         size = (hi - lo).tolist()
         self.resolution = np.array(cells_along(size, p.n, rule, density, resolution))
+        if flat:
+            self.resolution[np.argmin(self.resolution)] = 1
         self._refuse_too_many(size, rule, density)
         edges = ((hi - lo) / self.resolution)[self.resolution > 1]
         self.margin = max(GRID_OVERLAP * float(edges.min(initial=np.inf)) if len(edges) else 0.0,
@@ -62,7 +69,7 @@ class Grid(Structure):
         most = int(min(0.5 * free_memory() / CELL_BYTES, 2**31 - 1))
         cells = math.prod(self.resolution.tolist())
         if cells > most:
-            raise MemoryEstimateError(too_many("grid", self.resolution.tolist(), most, size, self.primitives.n, rule, density))
+            raise MemoryEstimateError(too_many(self.NAME, self.resolution.tolist(), most, size, self.primitives.n, rule, density))
 
     def _entries(self, progress):
         """Pairs (cell, item): which primitives reach into which cells."""
@@ -89,7 +96,7 @@ class Grid(Structure):
                 items.append(item)
                 total += len(cell)
             if total > limit:
-                raise MemoryEstimateError(f"grid: {' x '.join(map(str, self.resolution))} cells would hold more than {int(limit)} references to "
+                raise MemoryEstimateError(f"{self.NAME}: {' x '.join(map(str, self.resolution))} cells would hold more than {int(limit)} references to "
                                           f"primitives, which is what fits. Set resolution to {int(self.resolution.max()) // 2} or less.")
             begin = end
             progress(begin / p.n)
@@ -113,6 +120,10 @@ class Grid(Structure):
     def _index(self, x):
         """The cells of coordinates, shape (n, 3); one outside belongs to the nearest cell."""
         return np.clip(((x - self.lo) / self.width), 0, self.resolution - 1).astype(np.int64)
+
+    def _indices(self, cell):
+        """The cells' indices along the axes, columns."""
+        return np.stack(np.unravel_index(cell, tuple(self.resolution)))
 
     def _plane(self, k):
         """The coordinates of the planes below the k-th cells, shape (n, 3)."""
@@ -161,7 +172,7 @@ class Grid(Structure):
         if not self.primitives.n:
             return super().cells()
         n = len(self.lists.count)
-        index = np.stack(np.unravel_index(np.arange(n), tuple(self.resolution)), axis=1)
+        index = self._indices(np.arange(n)).T
         return Cells.make(np.concatenate([[self.lo], self._plane(index)]), np.concatenate([[self.hi], self._plane(index + 1)]),
                           np.concatenate([[0], np.ones(n)]), np.concatenate([[self.figures["N_ER"]], self.lists.count]),
                           np.concatenate([[False], np.ones(n, bool)]), np.concatenate([[-1], np.zeros(n)]))
@@ -182,12 +193,13 @@ class Walk:
     """
 
     def __init__(self, grid, rays, ray, t_in):
-        self.grid, self.ray, self.n, self.how = grid, ray, rays.n, grid.parameters["walk"]
+        self.grid, self.ray, self.n, self.how = grid, ray, rays.n, grid.parameters.get("walk", "exact")
         n = rays.n
         t_in = np.where(np.isfinite(t_in), t_in, 0.0)
         entry = rays.o + t_in * rays.d
         index = grid._index(entry.T).T
         up = rays.d > 0.0
+        self.rays, self.up = rays, up
         self.cell = grid.stride @ index
         self.step = np.where(up, 1, -1)
         self.leap = (self.step * grid.stride[:, None]).ravel()
@@ -237,4 +249,48 @@ class Walk:
                 self.L[ray + a * self.n] -= nearest
             self.L[place] = self.D.take(place)
             self.start[ray] = t_out
+        return ray
+
+    def region(self, ray, reach):
+        """Where rays leave regions that reach some cells beyond theirs on all sides, or on each (below, then above).
+
+        Returns
+        -------
+        t_out : ndarray
+        index : ndarray, shape (3, m)
+            The cells that they leave to.
+        """
+        grid = self.grid
+        below, above = (reach, reach) if len(reach) == 1 else (reach[:3], reach[3:])
+        up = self.up[:, ray]
+        places = ray + np.arange(3)[:, None] * self.n
+        here = self.plane.take(places).astype(np.int64) - up
+        edge = np.where(up, np.minimum(here + above, grid.resolution[:, None] - 1), np.maximum(here - below, 0))
+        crossing = np.empty(edge.shape)
+        for axis in range(3):
+            place = places[axis]
+            plane = grid.lo[axis] + (edge[axis] + up[axis]) * grid.width[axis]
+            crossing[axis] = np.where(self.moves.take(place), (plane - self.seen_from.take(place)) * self.inverse.take(place), np.inf)
+        axis = crossing.argmin(axis=0)
+        t_out = crossing.min(axis=0)
+        # Along the other axes: the cell of the point, neither behind this one nor beyond the region.
+        finite = np.where(np.isfinite(t_out), t_out, 0.0)
+        point = grid._index((self.rays.o[:, ray] + finite * self.rays.d[:, ray]).T).T
+        point = np.where(up, np.clip(point, here, edge), np.clip(point, edge, here))
+        i = np.arange(len(ray))
+        point[axis, i] = (edge + np.where(up, 1, -1))[axis, i]
+        return t_out, point
+
+    def leap_to(self, ray, t_out, index):
+        """Take rays to the cells `index`; those still in the grid."""
+        grid = self.grid
+        on = np.flatnonzero(((index >= 0) & (index < grid.resolution[:, None])).all(axis=0))
+        ray, index = ray.take(on), index[:, on]
+        up = self.up[:, ray]
+        self.cell[ray] = grid.stride @ index
+        for axis in range(3):
+            place = ray + axis * self.n
+            self.plane[place] = index[axis] + up[axis]
+            self.left[place] = np.where(up[axis], grid.resolution[axis] - index[axis], index[axis] + 1)
+            self.L[place] = self.distance(place, np.full(len(ray), axis))
         return ray

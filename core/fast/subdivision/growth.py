@@ -43,7 +43,9 @@ class Cells:
             self.level = np.zeros(len(self.count), np.int64)
 
     def take(self, index):
-        """Some of the cells."""
+        """Some of the cells, given by ascending numbers."""
+        if len(index) == len(self.count):
+            return self
         first = np.cumsum(self.count) - self.count
         refs = ranges(first[index], self.count[index])
         return Cells(self.lo[index], self.hi[index], self.count[index], self.item[refs], tuple(a[refs] for a in self.more), self.level[index])
@@ -237,7 +239,7 @@ class _Growth:
 
 
 #: Divisions that do not pay, allowed on the way to a leaf (Havran 2001; Pharr et al.).
-BAD_AT_MOST = 3
+BAD_AT_MOST = 1
 
 
 def joined(some):

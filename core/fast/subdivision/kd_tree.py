@@ -100,36 +100,39 @@ class KdTree(CellTree):
         size = cells.hi - cells.lo
         best, axis, at = np.full(m, np.inf), np.zeros(m, np.int64), np.full(m, np.nan)
         filled = np.flatnonzero(count)
+        events = 2 * count
+        high, step = cell << (POSITION_BITS + 2), np.arange(1, 2 * len(cell) + 1)
+        ends_before = np.repeat(count + first // 2, events)
+        begins_before = np.repeat(first // 2, events)
         for a in range(3):
-            scale = POSITIONS / size[:, a]
-            offset = cells.lo[:, a].take(cell)
-            begins = np.clip(np.floor((own_lo[:, a] - offset) * scale.take(cell)), 0, POSITIONS).astype(np.int64)
-            ends = np.clip(np.ceil((own_hi[:, a] - offset) * scale.take(cell)), 0, POSITIONS).astype(np.int64)
-            high = cell << (POSITION_BITS + 2)
+            scale, offset = np.repeat(POSITIONS / size[:, a], count), np.repeat(cells.lo[:, a], count)
+            begins = np.floor((own_lo[:, a] - offset) * scale).astype(np.int64)
+            ends = np.ceil((own_hi[:, a] - offset) * scale).astype(np.int64)
             key = np.concatenate([high | begins << 1 | 1, high | ends << 1]).view(np.uint64)
             key.sort()
             key = key.view(np.int64)
             begin = key & 1
             position = key >> 1 & (2 * POSITIONS - 1)
-            of = key >> (POSITION_BITS + 2)
-            before = np.cumsum(begin) - begin
-            left = before - before.take(first.take(of))
-            index = np.arange(len(key)) - first.take(of)
-            # Of the events up to here, those that were no beginnings were ends.
-            right = count.take(of) - (index + 1 - left - begin)
-            f = position / POSITIONS
+            begun = np.cumsum(begin)
+            # Every cell has as many beginnings as ends.
+            left = (begun - begin - begins_before).astype(float)
+            right = (begun - step + ends_before).astype(float)
             b, c = size[:, (a + 1) % 3], size[:, (a + 2) % 3]
-            face, rim = (b * c), (b + c) * size[:, a]
-            cost = 1.0 + ((face.take(of) + rim.take(of) * f) * left + (face.take(of) + rim.take(of) * (1.0 - f)) * right) / (face + rim).take(of)
-            empty = np.flatnonzero((left == 0) | (right == 0))
-            cost[empty] = 1.0 + (1.0 - self.empty_bonus) * (cost[empty] - 1.0)
+            face, rim = b * c, (b + c) * size[:, a]
+            cost = position * (1.0 / POSITIONS)
+            cost *= left - right
+            cost += right
+            cost *= np.repeat(rim / (face + rim), events)
+            cost += (left + right) * np.repeat(face / (face + rim), events)
+            empty = np.flatnonzero((left == 0.0) | (right == 0.0))
+            cost[empty] *= 1.0 - self.empty_bonus
             cost[(position <= 0) | (position >= POSITIONS)] = np.inf
             least = np.full(m, np.inf)
             least[filled] = np.minimum.reduceat(cost, first[filled])
             # The first event of each cell that is that cheap.
-            cheapest = np.flatnonzero(cost == least.take(of))[::-1]
+            cheapest = np.flatnonzero(cost == np.repeat(least, events))[::-1]
             event = np.zeros(m, np.int64)
-            event[of.take(cheapest)] = cheapest
+            event[key.take(cheapest) >> (POSITION_BITS + 2)] = cheapest
             better = np.flatnonzero(least < best)
             if not len(better):
                 continue

@@ -34,24 +34,36 @@ class Grid(Structure):
         How far primitives outside a cell are still listed in it.
     """
 
+    NAME = "grid"
+
     def build(self, progress, walk, rule, density, resolution, mailbox, lists):
+        self._lay_out(rule, density, resolution)
+        self._list(progress, lists)
+
+    def _lay_out(self, rule, density, resolution, flat=False):
+        """Choose resolution and box; with `flat`, the axis with the fewest cells is not divided."""
         primitives = self.primitives
         lo = [min(p.lo[axis] for p in primitives) for axis in range(3)]
         hi = [max(p.hi[axis] for p in primitives) for axis in range(3)]
         size = [h - l for l, h in zip(lo, hi)]
         self.resolution = cells_along(size, len(primitives), rule, density, resolution)
+        if flat:
+            self.resolution[self.resolution.index(min(self.resolution))] = 1
         cells, most = math.prod(self.resolution), int(min(0.5 * free_memory() / CELL_BYTES, 2**31 - 1))
         if cells > most:
-            raise MemoryEstimateError(too_many("grid", self.resolution, most, size, len(primitives), rule, density))
+            raise MemoryEstimateError(too_many(self.NAME, self.resolution, most, size, len(primitives), rule, density))
         edges = [(h - l) / n for l, h, n in zip(lo, hi, self.resolution) if n > 1]
         self.margin = max(GRID_OVERLAP * min(edges, default=0.0), 64.0 * EPSILON * max(map(abs, (*lo, *hi))), 1e-300)
         self.lo, self.hi = [x - self.margin for x in lo], [x + self.margin for x in hi]
         self.width = [(h - l) / n for l, h, n in zip(self.lo, self.hi, self.resolution)]
-        nx, ny, nz = self.resolution
-        self.lists, self.mail = [()] * (nx * ny * nz), [None] * len(primitives)
-        for item, primitive in enumerate(primitives):
+        self.mail = [None] * len(primitives)
+
+    def _list(self, progress, lists):
+        """Make the cells' lists, and fill in the figures."""
+        self.lists = [()] * math.prod(self.resolution)
+        for item, primitive in enumerate(self.primitives):
             self._enter(item, primitive)
-            progress((item + 1) / len(primitives))
+            progress((item + 1) / len(self.primitives))
         if lists == "shared":
             self.lists = shared(self.lists)
         self._measure()
@@ -65,7 +77,7 @@ class Grid(Structure):
         sure = sum(f != l for f, l in zip(first, last)) <= 1
         for index in itertools.product(*ranges):
             if sure or primitive.overlaps([self._plane(axis, index[axis]) - self.margin for axis in range(3)],
-                                              [self._plane(axis, index[axis] + 1) + self.margin for axis in range(3)]):
+                                          [self._plane(axis, index[axis] + 1) + self.margin for axis in range(3)]):
                 number = self._number(index)
                 if not self.lists[number]:
                     self.lists[number] = []
@@ -104,7 +116,7 @@ class Grid(Structure):
         least L says which plane is crossed next. A hit counts only in its own cell: the walk ends once the nearest
         hit lies before the current cell's exit.
         """
-        ray, how = query.ray, self.parameters["walk"]
+        ray, how = query.ray, self.parameters.get("walk", "exact")
         inside = ray.through_box(self.lo, self.hi, query.t)
         if inside is None:
             return
@@ -117,7 +129,6 @@ class Grid(Structure):
         entry = [o + t_in * d for o, d in zip(ray.o, ray.d)]
         cell = [self._index(axis, entry[axis]) for axis in range(3)]
         step = [1 if d > 0.0 else -1 for d in ray.d]
-        beyond = [n if s > 0 else -1 for n, s in zip(self.resolution, step)]
         # A component this small leads to no other cell; its plane is never crossed.
         moves = [math.isfinite(inverse) for inverse in ray.inverse]
 
@@ -135,12 +146,26 @@ class Grid(Structure):
             axis = L.index(nearest)
             t_out = start + nearest
             number = self._number(cell)
-            visits.enter(number, self.lists[number], t_in, t_out)
+            items = self.items_of(number, cell)
+            region = None if items else self.region(number, cell)
+            if region:
+                # From here to the region's end all cells are empty.
+                t_out, axis, far = self._leap(ray, cell, region)
+                if query.watch:
+                    query.watch.leap(t_in, t_out)
+            visits.enter(number, items, t_in, t_out)
             if query.t <= t_out:
                 return
-            cell[axis] += step[axis]
-            if cell[axis] == beyond[axis]:
+            if region:
+                cell = far
+                L = [distance_to_plane(a) for a in range(3)]
+            else:
+                cell[axis] += step[axis]
+            if cell[axis] in (-1, self.resolution[axis]):
                 return
+            if region:
+                t_in = t_out
+                continue
             if how == "subtract":           # the classic form: what was walked is taken from all three
                 start = t_out
                 L = [l - nearest for l in L]
@@ -150,6 +175,35 @@ class Grid(Structure):
             else:                           # from the plane's index: nothing accumulates
                 L[axis] = distance_to_plane(axis)
             t_in = t_out
+
+    def items_of(self, number, cell):
+        """The primitives of a cell."""
+        return self.lists[number]
+
+    def region(self, number, cell):
+        """The first and last cells, per axis, of an empty region around an empty cell; None where no such region is known."""
+        return None
+
+    def _leap(self, ray, cell, region):
+        """Where a ray leaves a region: t, the axis, and the cell to which it leaves."""
+        t_out, exit_axis, lo, hi = math.inf, 0, *region
+        for axis in range(3):
+            if math.isfinite(ray.inverse[axis]):
+                edge = hi[axis] + 1 if ray.d[axis] > 0.0 else lo[axis]
+                t = (self._plane(axis, edge) - ray.o[axis]) * ray.inverse[axis]
+                if t < t_out:
+                    t_out, exit_axis = t, axis
+        far = list(cell)
+        for axis in range(3):
+            up = ray.d[axis] > 0.0
+            if axis == exit_axis:
+                far[axis] = hi[axis] + 1 if up else lo[axis] - 1
+                continue
+            # The cell of the point, neither behind this one nor beyond the region.
+            first, last = (cell[axis], hi[axis]) if up else (lo[axis], cell[axis])
+            point = self._index(axis, ray.o[axis] + t_out * ray.d[axis])
+            far[axis] = min(max(point, first), last)
+        return t_out, exit_axis, far
 
     def cells(self):
         """The whole box, then every cell."""

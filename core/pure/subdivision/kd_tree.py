@@ -74,22 +74,23 @@ class KdTree(CellTree):
         best, best_axis, best_at = math.inf, 0, None
         size = [h - l for l, h in zip(node.lo, node.hi)]
         for axis in range(3):
-            scale, offset, top = POSITIONS / size[axis], node.lo[axis], float(POSITIONS)
+            scale, offset = POSITIONS / size[axis], node.lo[axis]
             events = []
             for lo, hi in node.boxes:
-                events.append((int(min(max(math.floor((lo[axis] - offset) * scale), 0.0), top)), BEGIN, lo[axis]))
-                events.append((int(min(max(math.ceil((hi[axis] - offset) * scale), 0.0), top)), END, hi[axis]))
+                events.append((math.floor((lo[axis] - offset) * scale), BEGIN, lo[axis]))
+                events.append((math.ceil((hi[axis] - offset) * scale), END, hi[axis]))
             events.sort(key=lambda event: event[:2])
             b, c = size[(axis + 1) % 3], size[(axis + 2) % 3]
             face, rim = b * c, (b + c) * size[axis]
+            # Parts of a cell's area: both ends, and the sides.
+            face, rim = face / (face + rim), rim / (face + rim)
             left, right, cheapest = 0, len(node.items), None
             for position, what, _ in events:
                 right -= what == END
                 if 0 < position < POSITIONS:
-                    f = position / POSITIONS
-                    cost = 1.0 + ((face + rim * f) * left + (face + rim * (1.0 - f)) * right) / (face + rim)
+                    cost = (position / POSITIONS * (left - right) + right) * rim + (left + right) * face
                     if left == 0 or right == 0:
-                        cost = 1.0 + (1.0 - self.empty_bonus) * (cost - 1.0)
+                        cost *= 1.0 - self.empty_bonus
                     if cost < best:
                         best, best_axis, cheapest = cost, axis, (position, what)
                 left += what == BEGIN

@@ -17,7 +17,7 @@ from ..structure import Structure
 from .lists import Visits, shared
 
 #: Divisions that do not pay, allowed on the way to a leaf (Havran 2001; Pharr et al.).
-BAD_AT_MOST = 3
+BAD_AT_MOST = 1
 
 
 class Node:
