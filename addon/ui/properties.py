@@ -45,6 +45,8 @@ def _property(parameter, core):
         return BoolProperty(**about)
     make = IntProperty if parameter.type is int else FloatProperty
     limits = {key: parameter.type(value) for key, value in (("min", parameter.low), ("max", parameter.high)) if value is not None}
+    if parameter.type is int and parameter.high is not None:
+        limits["max"] = min(limits["max"], 2**31 - 1)  # what Blender can hold
     return make(**about, **limits)
 
 

@@ -11,6 +11,7 @@ from bl_ext.user_default.rayscope.addon import engine
 
 ENGINE = engine.ENGINE
 SIZE = 96, 64
+EXAMPLES = Path(__file__).resolve().parents[2] / "example_blends"
 OBJECT_INDEX = engine.BUILT_IN[3][0]
 
 
@@ -213,7 +214,10 @@ def agree_with_cycles(scene, folder):
     return (np.abs(ours - theirs)[both] <= 1e-4 * theirs[both]).mean(), both.mean(), ours, theirs
 
 
-@pytest.mark.skipif("cycles" not in bpy.context.preferences.addons and not hasattr(bpy.types.Scene, "cycles"), reason="this Blender has no Cycles")
+needs_cycles = pytest.mark.skipif(not hasattr(bpy.types.Scene, "cycles"), reason="this Blender has no Cycles")
+
+
+@needs_cycles
 @pytest.mark.parametrize("kind", ["PERSP", "ORTHO"])
 def test_depth_agrees_with_cycles(scene, tmp_path, kind):
     lens = scene.camera.data
@@ -223,3 +227,15 @@ def test_depth_agrees_with_cycles(scene, tmp_path, kind):
     assert pixels > 0.4
     assert share >= 0.999, share
     assert ((ours == 1e10) == (theirs == 1e10)).mean() > 0.995
+
+
+@needs_cycles
+@pytest.mark.parametrize("name", ["still_life", "forest", "teapot_in_a_stadium", "interior"])
+def test_depth_of_the_examples_agrees_with_cycles(tmp_path, name):
+    bpy.ops.wm.open_mainfile(filepath=str(EXAMPLES / f"{name}.blend"))
+    scene = bpy.context.scene
+    scene.render.resolution_x, scene.render.resolution_y, scene.render.resolution_percentage = 240, 135, 100
+    share, pixels, ours, theirs = agree_with_cycles(scene, tmp_path)
+    assert pixels > 0.1
+    assert share >= 0.999, share
+    assert ((ours == 1e10) == (theirs == 1e10)).mean() > 0.99

@@ -38,7 +38,8 @@ def tick():
                 print("ALL STEPS DONE", flush=True)
                 bpy.ops.wm.quit_blender()
                 return None
-            for area in bpy.context.window.screen.areas:
+        for window in bpy.context.window_manager.windows:  # not in the context of before: a step may have opened another file
+            for area in window.screen.areas:
                 area.tag_redraw()
         return SETTLE
     except BaseException:

@@ -108,3 +108,23 @@ def steps():
     log["share_done"] = float((pixels[..., 3] > 0).mean())
     log["mean"] = float(pixels[..., :3].mean())
     Path(folder, "log.json").write_text(json.dumps(log))
+
+    # Another file, and disabling the add-on, while it runs.
+    operators.ASK_SECONDS = float("inf")
+    assert bpy.ops.rayscope.trace("INVOKE_DEFAULT") == {"RUNNING_MODAL"}
+    yield "again"
+    job = work.current()
+    assert job is not None
+    bpy.ops.wm.read_homefile(use_factory_startup=True)
+    assert not job.running and work.current() is None
+    yield "another_file"
+    scene = bpy.context.scene
+    scene.rayscope.samples = 256
+    assert bpy.ops.rayscope.trace("INVOKE_DEFAULT") == {"RUNNING_MODAL"}
+    yield "once_more"
+    job = work.current()
+    assert job is not None
+    bpy.ops.preferences.addon_disable(module="bl_ext.user_default.rayscope")
+    assert not job.running
+    yield "disabled"
+    assert not hasattr(scene, "rayscope")
