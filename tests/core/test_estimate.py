@@ -1,0 +1,71 @@
+"""Estimates: in the right order of magnitude, in words, and memory that is not there is an error before anything is built."""
+import time
+
+import numpy as np
+import pytest
+
+from rayscope.core import Camera, MemoryEstimateError, Scene, build, techniques, trace
+from rayscope.core.lab import estimate as lab
+from rayscope.core.lab.estimate import estimate
+
+
+def soup(n, seed=1):
+    rng = np.random.default_rng(seed)
+    corners = rng.random((n, 1, 3)) + rng.normal(0, 0.5 / n ** (1 / 3), (n, 3, 3))
+    return Scene.from_triangles(corners.reshape(-1, 3), np.arange(3 * n).reshape(-1, 3),
+                                camera=Camera.look_at((3, -3, 2), (0.5, 0.5, 0.5), angle=0.4))
+
+
+def test_time_is_of_the_right_order():
+    """Processor time, since others may use the machine; a factor of twenty either way would be a mistake."""
+    for core, name, n, side in (("fast", "bvh", 20_000, 160), ("fast", "grid", 5000, 100), ("pure", "bvh", 300, 24), ("pure", "grid", 300, 24)):
+        scene = soup(n)
+        expected = estimate(scene, name, core, (side, side)).seconds
+        trace(soup(10), name, core, size=(4, 4))  # imports
+        start = time.process_time()
+        trace(scene, name, core, size=(side, side))
+        assert 0.05 < expected / (time.process_time() - start) < 20, (core, name, expected)
+
+
+def test_it_grows_with_what_is_asked():
+    small, large = soup(100), soup(10_000)
+    for row in techniques():
+        for core in row.cores:
+            assert estimate(small, row.name, core).seconds < estimate(large, row.name, core).seconds
+            assert estimate(small, row.name, core).bytes < estimate(large, row.name, core).bytes
+    one, four = estimate(large, size=(100, 100)), estimate(large, size=(200, 200))
+    assert four.rays == 4 * one.rays and four.seconds > 2 * one.seconds
+    assert estimate(large, size=(100, 100), samples=8).rays == 8 * one.rays
+    assert estimate(large, core="pure", size=(100, 100)).seconds > 5 * one.seconds
+    assert estimate(large).rays == 0
+
+
+def test_instances_are_stored_once():
+    from rayscope.core import Object
+    mesh = soup(2000).objects[0].geometry
+    matrices = [np.diag([1, 1, 1, 1.0]) for _ in range(500)]
+    forest = Scene([Object(f"Tree {i}", mesh, m) for i, m in enumerate(matrices)])
+    copies = estimate(forest)
+    assert copies.primitives == 1_000_000 and copies.bytes < 0.01 * 1_000_000 * lab.COSTS["bvh", "fast"].memory
+
+
+def test_memory_that_is_not_there(monkeypatch):
+    scene = soup(1000)
+    monkeypatch.setattr(lab, "free_memory", lambda: 1e5)
+    with pytest.raises(MemoryEstimateError, match="GB of memory would be needed for 1,000 primitives"):
+        estimate(scene).check_memory()
+    monkeypatch.setattr(lab, "free_memory", lambda: None)  # the system does not tell
+    assert estimate(scene).check_memory().primitives == 1000
+    monkeypatch.undo()
+    assert lab.free_memory() is None or lab.free_memory() > 1e6
+    build(scene)
+
+
+@pytest.mark.parametrize(("seconds", "text"), [(0.123, "0.12 s"), (12.3, "12 s"), (150, "2 min"), (9000, "2.5 h")])
+def test_durations(seconds, text):
+    assert lab.duration(seconds) == text
+
+
+def test_in_words():
+    lines = estimate(soup(1000), size=(10, 10)).lines()
+    assert "about" in lines[0] and "MB of memory (1,000 primitives, 100 rays)" in lines[0] and "Esc" in lines[1]
