@@ -63,6 +63,12 @@ def too_many(name, cells, most, size, n, rule, density):
             f"Set resolution to {fits} or less.")
 
 
+def too_many_slabs(need, slabs):
+    """The message that lists of slabs would not fit."""
+    return (f"separated-grid: lists of {' + '.join(map(str, slabs))} slabs would take {need / 2**30:.1f} GiB, more than half of the free "
+            f"memory. Set intersect to sorted, or resolution to {max(slabs) // 2} or less.")
+
+
 def limit_notice(name, limit, lo, hi, level, count):
     """What is said when division stopped because there were too many references."""
     def text(point):

@@ -97,7 +97,7 @@ class Visits:
 
     Parameters
     ----------
-    lists : Lists
+    lists : Lists, or None where a subclass finds cells' primitives in another way
     query : Closest or Occluded
     n : int
         Primitives in the set.
@@ -108,7 +108,7 @@ class Visits:
     def __init__(self, lists, query, n, mailbox):
         self.lists, self.query, self.counts, self.n = lists, query, query.counts, n
         self.mailbox = PairSet() if mailbox else None
-        self.marks = PairSet() if lists.list_of is not None else None
+        self.marks = PairSet() if lists is not None and lists.list_of is not None else None
 
     def enter(self, ray, cell):
         """Rays enter cells, at most one each: test what is there, unless it was tested before."""

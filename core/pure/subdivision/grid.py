@@ -49,14 +49,18 @@ class Grid(Structure):
         self.resolution = cells_along(size, len(primitives), rule, density, resolution)
         if flat:
             self.resolution[self.resolution.index(min(self.resolution))] = 1
-        cells, most = math.prod(self.resolution), int(min(0.5 * free_memory() / CELL_BYTES, 2**31 - 1))
-        if cells > most:
-            raise MemoryEstimateError(too_many(self.NAME, self.resolution, most, size, len(primitives), rule, density))
+        self._refuse_too_many(size, rule, density)
         edges = [(h - l) / n for l, h, n in zip(lo, hi, self.resolution) if n > 1]
         self.margin = max(GRID_OVERLAP * min(edges, default=0.0), 64.0 * EPSILON * max(map(abs, (*lo, *hi))), 1e-300)
         self.lo, self.hi = [x - self.margin for x in lo], [x + self.margin for x in hi]
         self.width = [(h - l) / n for l, h, n in zip(self.lo, self.hi, self.resolution)]
         self.mail = [None] * len(primitives)
+
+    def _refuse_too_many(self, size, rule, density):
+        """Raise before anything is allocated that would not fit into half of the free memory."""
+        most = int(min(0.5 * free_memory() / CELL_BYTES, 2**31 - 1))
+        if math.prod(self.resolution) > most:
+            raise MemoryEstimateError(too_many(self.NAME, self.resolution, most, size, len(self.primitives), rule, density))
 
     def _list(self, progress, lists):
         """Make the cells' lists, and fill in the figures."""

@@ -22,7 +22,7 @@ class Visits:
     def __init__(self, structure, query):
         self.query = query
         self.mail = structure.mail if structure.parameters["mailbox"] else None
-        self.marks = set() if structure.parameters["lists"] == "shared" else None
+        self.marks = set() if structure.parameters.get("lists") == "shared" else None
 
     def enter(self, number, items, t_in, t_out):
         """The ray enters cell `number`: test the primitives that are there, unless they were tested before."""
