@@ -1,0 +1,101 @@
+"""Exact arithmetic: held against what can be calculated by hand, and the structures' walks against it."""
+import math
+from fractions import Fraction
+
+import numpy as np
+import pytest
+from rayscope.core import Scene, build
+from rayscope.core.lab import exact
+from rayscope.core.pure.ray import Ray
+from rayscope.core.pure.watch import Watch
+
+CORNERS = (0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0)
+
+
+def test_triangle():
+    assert exact.triangle((0.25, 0.5, 3.0), (0, 0, -2), *CORNERS) == (Fraction(3, 2), Fraction(1, 4), Fraction(1, 2))
+    assert exact.triangle((0.5, 0.5, 1.0), (0, 0, -1), *CORNERS) == (1, Fraction(1, 2), Fraction(1, 2))         # on the edge
+    assert exact.triangle((0.5, math.nextafter(0.5, 1.0), 1.0), (0, 0, -1), *CORNERS) is None                  # one ulp beside it
+    assert exact.triangle((0.1, 0.1, 1.0), (0, 0, 1), *CORNERS)[0] == -1
+    assert exact.triangle((0.1, 0.1, 1.0), (1, 0, 0), *CORNERS) is None and exact.triangle((0, 0, 1), (0, 0, -1), *CORNERS[:2], (2, 0, 0)) is None
+    rng = np.random.default_rng(0)
+    for o, a, b, c in rng.normal(size=(20, 4, 3)):
+        u, v = rng.random(2)
+        d = (1 - u - v) * a + u * b + v * c - o
+        t, u1, v1, w1 = exact.triangle_plane(o, d, a, b, c)
+        assert abs(t - 1) < 1e-12 and abs(u1 - Fraction(u)) < 1e-12 and abs(v1 - Fraction(v)) < 1e-12 and u1 + v1 + w1 == 1
+        on = [x + t * y for x, y in zip(map(Fraction, o), map(Fraction, d))]
+        assert on == [w1 * Fraction(x) + u1 * Fraction(y) + v1 * Fraction(z) for x, y, z in zip(a, b, c)]
+
+
+def test_box_plane_sphere():
+    assert exact.box((-1, 0.5, 0.5), (0.5, 0, 0), (0, 0, 0), (1, 1, 1)) == (2, 4)
+    assert exact.box((-1, 1.0, 0.5), (1, 0, 0), (0, 0, 0), (1, 1, 1)) == (1, 2)                                # sliding in a face
+    assert exact.box((-1, 0.5, 1.5), (1, 0, -0.0), (0, 0, 0), (1, 1, 1)) is None
+    assert exact.box((0, 1, 0.5), (1, 1, 0), (0, 0, 0), (1, 1, 1)) == (0, 0)                                   # an edge touched
+    assert exact.plane((0, 0, 1), (0, 3, -3), (5, 5, 0), (0, 0, 7)) == Fraction(1, 3)
+    assert exact.plane((0, 0, 1), (1, 0, 0), (0, 0, 0), (0, 0, 1)) is None
+    assert exact.sphere((-2, 0, 0), (1, 0, 0), (0, 0, 0), 1.0) == (1, 3)
+    assert exact.sphere((-2, 1, 0), (1, 0, 0), (0, 0, 0), 1.0) == (2, 2)
+    assert exact.sphere((-2, math.nextafter(1, 2), 0), (1, 0, 0), (0, 0, 0), 1.0) is None
+    t = exact.sphere((0, 0, 0), (1, 1, 0), (0, 0, 0), 1.0)[1]
+    assert 0 <= Fraction(1, 2) - t * t < Fraction(1, 2**198)
+    assert exact.error(math.sqrt(0.5), t)[1] <= 0.5 + 1e-9
+
+
+def test_square_root():
+    assert exact.square_root(Fraction(9, 4)) == Fraction(3, 2) and exact.square_root(Fraction(0)) == 0
+    for x in (Fraction(2), Fraction(1, 10**30), Fraction(10**300, 7)):
+        r = exact.square_root(x)
+        assert r * r <= x < (r * (1 + Fraction(1, 2**exact.ROOT_BITS))) ** 2
+
+
+class Visited(Watch):
+    def __init__(self):
+        self.cells = []
+
+    def cell(self, number, t_in, t_out, leaf, empty):
+        if leaf:
+            self.cells.append(number)
+
+
+@pytest.mark.parametrize("name, parameters", [("grid", {"walk": w}) for w in ("exact", "add", "subtract")]
+                         + [(n, {"walk": w}) for n in ("octree", "kd-tree") for w in ("root", "intervals", "links", "heap")], ids=str)
+def test_cells_that_a_ray_visits(name, parameters):
+    """Every leaf that the ray runs through by more than rounding, up to the hit, in order; and none that lies off the ray."""
+    rng = np.random.default_rng(3)
+    corners = (rng.random((40, 1, 3)) + 0.1 * rng.normal(size=(40, 3, 3))).reshape(-1, 3)
+    index = build(Scene.from_triangles(corners, np.arange(120).reshape(-1, 3)), name, "pure", lists="own", **parameters)
+    cells = index.cells()
+    shift = 1 if name == "grid" else 0                                  # the grid's own box is its first cell
+    lo, hi = cells.lo.min(axis=0), cells.hi.max(axis=0)
+    rounding = 2.0**-40 * float((hi - lo).max())
+    vertex = cells.lo[cells.leaf][rng.integers(cells.leaf.sum(), size=12)]
+    origins = 0.5 * (lo + hi) + 2.0 * rng.normal(size=(24, 3))
+    directions = np.concatenate([vertex - origins[:12], rng.uniform(lo, hi, (12, 3)) - origins[12:]])
+    checked = 0
+    for o, d in zip(origins.tolist(), directions.tolist()):
+        watch, ray = Visited(), Ray(o, d)
+        hit = index.closest_ray(ray, watch)
+        visited = [number + shift for number in watch.cells]
+        size = max(map(abs, d))
+        truth = exact.tree_sequence(cells, o, d, 0.0, hit.t if hit else math.inf)
+        certain = [k for k, t_in, t_out in truth if (t_out - t_in) * size > rounding]
+        assert [k for k in visited if k in set(certain)] == certain
+        for k in visited:                                               # none that the ray passes by
+            assert exact.box(o, d, (cells.lo[k] - rounding).tolist(), (cells.hi[k] + rounding).tolist()) is not None
+        checked += len(certain)
+    assert checked > 60
+
+
+def test_grid_sequence_is_that_of_its_boxes():
+    rng = np.random.default_rng(4)
+    index = build(Scene.from_triangles(rng.random((30, 3)), np.arange(30).reshape(-1, 3)), "grid", "pure")
+    planes = [[index._plane(axis, k) for k in range(index.resolution[axis] + 1)] for axis in range(3)]
+    cells = index.cells()
+    for _ in range(10):
+        o, d = rng.normal(size=3) * 2, rng.normal(size=3)
+        d = 0.5 - o if rng.random() < 0.7 else d
+        by_boxes = [(k - 1, a, b) for k, a, b in exact.tree_sequence(cells, o, d) if a < b]
+        by_planes = [(index._number(k), a, b) for k, a, b in exact.grid_sequence(planes, o, d)]
+        assert by_boxes == by_planes
