@@ -23,7 +23,7 @@ class Built:
     number : int
         Different for every build.
     ends : dict
-        Values that the ends of the colour map stand for, by what the colours show; filled when they are first drawn.
+        Values that the ends of the colour map stand for, by what is coloured; filled when they are first shown.
     """
 
     scene: object

@@ -53,21 +53,23 @@ def values(cells, by):
     return {"LEVEL": cells.level, "COUNT": cells.count, "COST": cells.cost}[by]
 
 
-def scale(cells, by):
+def scale(cells, by, leaves_only=False):
     """The values that the two ends of the colour map stand for: (lowest, highest).
 
-    Both are of the whole structure, not of the cells selected, so that a colour keeps its meaning while levels are
-    filtered. Counts and costs fall off by orders of magnitude below the root, so theirs is logarithmic.
+    Both are of all leaves, or of the whole structure, whatever levels are selected: so a colour keeps its meaning while
+    levels are filtered. Counts and costs fall off by orders of magnitude below the root, so theirs is logarithmic.
     """
     value = values(cells, by)
+    if leaves_only:
+        value = value[cells.leaf]
     if by != "LEVEL":
         value = value[value > 0]
     return (float(value.min()), float(value.max())) if len(value) else (0.0, 0.0)
 
 
-def place(cells, index, by):
+def place(cells, index, by, leaves_only=False):
     """Where in the colour map, 0..1, the cells chosen lie, shape (n,); cells without primitives or cost lie at 0."""
-    low, high = scale(cells, by)
+    low, high = scale(cells, by, leaves_only)
     value = values(cells, by)[index].astype(np.float32)
     if not high > low:
         return np.zeros(len(index), np.float32)
@@ -105,5 +107,5 @@ def boxes(cells, levels=None, leaves_only=False, empty=True, by="LEVEL", opacity
     texels[:n, 1, :3] = cells.hi if every else cells.hi[index]
     texels[:n, :2, 3] = 1.0
     table = np.concatenate([colour_map(), np.full((256, 1), opacity, np.float32)], axis=1)
-    texels[:n, 2] = table[(place(cells, index, by) * 255.0 + 0.5).astype(np.uint8)]
+    texels[:n, 2] = table[(place(cells, index, by, leaves_only) * 255.0 + 0.5).astype(np.uint8)]
     return texels.reshape(-1, 3 * CELLS_PER_ROW, 4), n

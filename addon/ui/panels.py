@@ -72,20 +72,20 @@ def draw_overlay(layout, scene):
     layout.prop(overlay, "colour_by")
     built = session.built_of(scene)
     if built is not None and len(built.cells):
-        low, high = _ends(built, overlay.colour_by)
+        low, high = (f"{end:.3g}" if overlay.colour_by == "COST" else f"{end:,.0f}" for end in _ends(built, overlay.colour_by, overlay.leaves_only))
         row = layout.row()
         row.alignment = "RIGHT"
-        row.label(text=f"Purple {low:.3g}, yellow {high:.3g}")
+        row.label(text=f"Purple {low}, yellow {high}")
     layout.prop(overlay, "opacity", slider=True)
     layout.prop(overlay, "in_front")
 
 
-def _ends(built, by):
-    """The values of the colour map's ends, computed once for each structure."""
-    if by not in built.ends:
+def _ends(built, *choice):
+    """The values of the colour map's ends, computed once for each structure and choice of what is coloured."""
+    if choice not in built.ends:
         from ..show.overlay_data import scale
-        built.ends[by] = scale(built.cells, by)
-    return built.ends[by]
+        built.ends[choice] = scale(built.cells, *choice)
+    return built.ends[choice]
 
 
 def draw_notices(layout, scene, width):

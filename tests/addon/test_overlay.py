@@ -63,6 +63,14 @@ def test_colours_span_the_map_and_do_not_change_with_the_levels_shown(by):
     assert (np.diff(place[order]) >= -1e-6).all(), "a higher value must not have a darker colour"
 
 
+def test_leaves_alone_span_the_map_too():
+    cells = tree()
+    leaves = overlay_data.select(cells, leaves_only=True)
+    place = overlay_data.place(cells, leaves, "COUNT", leaves_only=True)
+    assert place.max() == pytest.approx(1.0) and overlay_data.place(cells, leaves, "COUNT").max() < 0.8
+    assert overlay_data.scale(cells, "COUNT", True) == (2.0, 8.0)
+
+
 def test_one_level_or_nothing_has_colours_too():
     single = Cells.make([(0, 0, 0)], [(1, 1, 1)], [0], [0], [True], [-1])
     for by in overlay_data.COLOUR_BY:

@@ -28,7 +28,7 @@ def test_overlay_is_drawn_filtered_hidden_and_gone(tmp_path):
     assert nothing + 1000 < n["behind"] < n["shown"], "what the surface hides is not drawn"
     assert n["grid"] > nothing + 1000
     assert n["cleared"] == nothing and n["disabled"] == nothing
-    assert abs(n["enabled"] - n["shown"]) < 0.1 * n["shown"] or n["enabled"] > nothing + 3000
+    assert n["enabled"] > nothing + 3000, "enabled again, it still works"
 
 
 def test_trace_asks_shows_progress_and_stops_at_once(tmp_path):
