@@ -271,6 +271,8 @@ def trace_options(sub):
     sub.add_argument("--depth", type=int, default=5, help="reflections and refractions in a row, at most")
     sub.add_argument("--samples", type=int, default=1, help="samples a pixel")
     sub.add_argument("--seed", type=int, default=0)
+    sub.add_argument("--threshold", type=float, default=0.0, help="rays with less weight in their pixel are not traced")
+    sub.add_argument("--roulette", action="store_true", help="trace some of the rays below the threshold, by chance, for the others")
     sub.add_argument("--count", action="store_true", help="count tests and steps (slower)")
     sub.add_argument("--image", metavar="OUT.png", help="write the picture")
     sub.add_argument("--figures", metavar="OUT.json", help="write what it cost")
@@ -293,15 +295,16 @@ def trace_verb(call):
         say(expected.lines()[0])
     with stoppable() as progress:
         result = trace(scene, name, call.core, size, call.depth, call.samples, call.seed, parameters=parameters, count=call.count,
-                       progress=progress, **others)
+                       progress=progress, threshold=call.threshold, roulette=call.roulette, **others)
     for notice in result.notices:
         say(str(notice))
     asked = {"technique": name, "parameters": parameters, **others, "core": call.core, "size": size, "depth": call.depth,
-             "samples": call.samples}
+             "samples": call.samples, "threshold": call.threshold, "roulette": call.roulette}
     record = report.record("trace", scene, call.seed, asked, figures=result.figures, stopped=result.cancelled)
-    rows = [{"rays": kind, **{key: row.get(key) for key in ("technique", "hits", "N_IT", "N_TS", "N_ETS", "N_EETS", "r_ITM")}, "n": row["rays"]}
+    rows = [{"rays": kind, **{key: row.get(key) for key in ("technique", "hits", "saved", "N_IT", "N_TS", "N_ETS", "N_EETS", "r_ITM")}, "n": row["rays"]}
             for kind, row in result.figures.items() if isinstance(row, dict) and row["rays"]]
-    columns = ["rays", "technique", "n", "hits", *(("N_IT", "N_TS", "N_ETS", "N_EETS", "r_ITM") if call.count else ())]
+    columns = ["rays", "technique", "n", "hits", *(("saved",) if call.threshold else ()),
+               *(("N_IT", "N_TS", "N_ETS", "N_EETS", "r_ITM") if call.count else ())]
     text = [report.table(rows, columns), "", f"T_B {result.figures['T_B']:.3g} s, T_R {result.figures['T_R']:.3g} s"]
     if call.image:
         save_png(call.image, result.image)

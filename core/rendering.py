@@ -26,6 +26,10 @@ PARAMETERS = (
         "samples", 1, "Samples a pixel; 1 goes through the pixel's centre and gives hard shadows", low=1, high=1_000_000
     ),
     Parameter("seed", 0, "Chooses other random numbers", low=-(2**31), high=2**31 - 1),
+    Parameter(
+        "threshold", 0.0, "Rays with less weight in their pixel are not traced (adaptive depth)", low=0.0, high=1.0
+    ),
+    Parameter("roulette", False, "Trace some of the rays below the threshold, by chance, for those that are not traced"),
 )
 
 #: Pass -> (values a pixel, type, value where nothing was met). Blender's float passes have single precision.
@@ -69,7 +73,8 @@ class Result:
         ``T_B``: time to build the structures that were not given; ``T_R``: time to trace, s;
         for ``primary``, ``reflected``, ``refracted``, ``transparent`` (straight on through alpha), ``shadow`` a dict:
         ``technique``, ``rays``, ``hits``, and where counted ``N_IT``, ``N_TS``, ``N_ETS``, ``N_EETS`` per ray,
-        ``r_ITM``. A shadow ray through glass counts once for each stretch between two surfaces.
+        ``r_ITM``, and with a threshold ``saved``: rays not traced, without those that they would have sent on.
+        A shadow ray through glass counts once for each stretch between two surfaces.
     notices : list of Notice
         What is amiss but did not stop the run.
     structures : dict
@@ -102,6 +107,8 @@ def trace(
     on_tile=None,
     count=False,
     parameters=None,
+    threshold=0.0,
+    roulette=False,
 ):
     """Trace a picture as Whitted (1980) did.
 
@@ -138,6 +145,12 @@ def trace(
         Also count intersection tests and traversal steps.
     parameters : dict, optional
         Of `technique`.
+    threshold : float
+        Dynamic recursion control: reflected, refracted and transparent rays whose weight in their pixel is less, in
+        every colour, are not traced; 0 traces all up to `depth`.
+    roulette : bool
+        Such a ray is traced with the probability weight / threshold, and then weighs `threshold`: the mean over many
+        samples is right, at the price of noise.
 
     Returns
     -------
@@ -171,6 +184,8 @@ def trace(
         progress,
         count,
         parameters,
+        threshold,
+        roulette,
     )
     for tile in rendering.tiles():
         if on_tile:
@@ -206,10 +221,13 @@ class Rendering:
         progress=None,
         count=False,
         parameters=None,
+        threshold=0.0,
+        roulette=False,
     ):
         if core not in CORES:
             raise ParameterError(f"trace: there is no core {core!r}. Cores: {', '.join(CORES)}.")
-        values = resolve("trace", PARAMETERS, {"depth": depth, "samples": samples, "seed": seed}, core)
+        given = {"depth": depth, "samples": samples, "seed": seed, "threshold": threshold, "roulette": roulette}
+        values = resolve("trace", PARAMETERS, given, core)
         self.scene, self.core, self.count = scene, core, bool(count)
         self.samples = values["samples"]
         self.size = check_size(size)
@@ -241,6 +259,8 @@ class Rendering:
             values["seed"],
             self.count,
             self._check,
+            values["threshold"],
+            values["roulette"],
         )
 
     def _wanted(self, technique, parameters, primary, shadow, secondary, index, depth):
@@ -359,6 +379,8 @@ class Rendering:
                 "rays": tally["rays"],
                 "hits": tally["hits"],
             }
+            if self._tracer.threshold:
+                row["saved"] = tally["saved"]
             if self.count:
                 row |= ray_figures(*(tally[name] for name in PER_RAY), tally["rays"], tally["hits"])
             figures[kind] = row

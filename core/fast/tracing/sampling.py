@@ -13,6 +13,8 @@ MASK = 0xFFFFFFFFFFFFFFFF
 
 #: Dimensions of a ray's numbers: place in the pixel; then two for each light.
 PIXEL, LIGHTS = 0, 2
+#: Russian roulette's, the last before those that make keys.
+ROULETTE = (1 << 32) - 1
 #: Dimensions from here on make the keys of the rays that it spawns.
 BRANCHES = 1 << 32
 

@@ -87,16 +87,24 @@ class Whitted:
         Also count intersection tests and traversal steps.
     check : callable
         Called without arguments every few ten milliseconds; may raise Cancelled.
+    threshold : float
+        Dynamic recursion control: a ray whose weight in its pixel is less, in every colour, is not traced (Hall and
+        Greenberg 1983).
+    roulette : bool
+        Such a ray is traced with the probability weight / threshold, and then weighs `threshold` (Arvo and Kirk 1990):
+        noise, where leaving it out makes the picture too dark.
 
     Attributes
     ----------
     tally : dict
-        Per kind of ray: rays, hits, n_it, n_ts, n_ets, n_eets.
+        Per kind of ray: rays, hits, n_it, n_ts, n_ets, n_eets, and saved: rays not traced for their small weight.
     """
 
     tile_side = TILE
 
-    def __init__(self, scene, structures, size, depth, samples, seed, count, check):
+    def __init__(
+        self, scene, structures, size, depth, samples, seed, count, check, threshold=0.0, roulette=False
+    ):
         self.scene, self.size, self.depth, self.samples, self.seed, self.count = (
             scene,
             size,
@@ -105,12 +113,12 @@ class Whitted:
             seed,
             count,
         )
-        self.check = check
+        self.check, self.threshold, self.roulette = check, threshold, roulette and threshold > 0.0
         probes = {id(s): Probe(s, check, count) for s in structures.values()}
         self.probe = {kind: probes[id(s)] for kind, s in structures.items()}
         self.surfaces = Surfaces(scene)
         self.ambient = np.array(scene.world.ambient_light(), float)
-        self.tally = {kind: dict.fromkeys(("rays", "hits", *COUNTED), 0) for kind in KINDS}
+        self.tally = {kind: dict.fromkeys(("rays", "hits", "saved", *COUNTED), 0) for kind in KINDS}
         materials = scene.used_materials()
         self.bounces = depth > 0 and any(m.reflects or m.refracts for m in materials)
         self.transparent = any(m.transparent for m in materials)
@@ -131,8 +139,8 @@ class Whitted:
         """
         pixels = (np.arange(y0, y1)[:, None] * self.size[0] + np.arange(x0, x1)).ravel()
         n = len(pixels)
-        key = sampling.first_key(pixels, sample, self.seed) if self.samples > 1 else None
-        o, d = primary(self.scene.camera, self.size, pixels, key)
+        key = sampling.first_key(pixels, sample, self.seed) if self.samples > 1 or self.roulette else None
+        o, d = primary(self.scene.camera, self.size, pixels, key if self.samples > 1 else None)
         self.radiance = np.zeros((3, n))
         self.per_pixel = {
             name: np.zeros(n, np.int64) for name in ("rays_per_pixel", *(("n_it", "n_ts") if self.count else ()))
@@ -147,7 +155,7 @@ class Whitted:
                 np.arange(n),
                 np.zeros(n, np.int32),
                 np.full(n, PRIMARY, np.uint8),
-                key if self.soft else None,
+                key if self.soft or self.roulette else None,
                 t_min=float(camera.near),
             )
         ]
@@ -226,7 +234,7 @@ class Whitted:
         if self.lights:
             from .shading import lit
 
-            key = None if wave.key is None else wave.key[met]
+            key = wave.key[met] if self.soft else None
             pixel = wave.pixel[met]
             seen += lit(
                 table,
@@ -313,8 +321,7 @@ class Whitted:
                 ]
         return [w for w in waves if len(w)]
 
-    @staticmethod
-    def _spawn(wave, met, surface, kind, direction, weight, t_max):
+    def _spawn(self, wave, met, surface, kind, direction, weight, t_max):
         """Rays from surfaces, those with no weight left out."""
         weight = wave.weight[:, met] * weight
         which = np.flatnonzero((weight > 0.0).any(axis=0) & (t_max >= 0.0))
@@ -322,14 +329,30 @@ class Whitted:
         # A ray that gets no further would go on for ever.
         moved = np.flatnonzero((o != wave.o[:, met[which]]).any(axis=0))
         which, o = which[moved], o[:, moved]
+        weight = weight[:, which]
+        key = None if wave.key is None else sampling.branch(wave.key[met[which]], kind)
+        if self.threshold:
+            kept = self._worth(kind, weight, key)
+            which, o, weight, key = which[kept], o[:, kept], weight[:, kept], None if key is None else key[kept]
         ray = met[which]
         return Wave(
             o,
             direction[:, which],
             t_max[which],
-            weight[:, which],
+            weight,
             wave.pixel[ray],
             wave.depth[ray] + (kind != TRANSPARENT),
             np.full(len(ray), kind, np.uint8),
-            None if wave.key is None else sampling.branch(wave.key[ray], kind),
+            key,
         )
+
+    def _worth(self, kind, weight, key):
+        """Which rays weigh enough; the winners of the roulette are made heavier in place."""
+        most = weight.max(axis=0)
+        kept = most >= self.threshold
+        if self.roulette:
+            won = ~kept & (sampling.number(key, sampling.ROULETTE) * self.threshold < most)
+            weight[:, won] *= self.threshold / most[won]
+            kept |= won
+        self.tally[KINDS[kind]]["saved"] += len(kept) - int(np.count_nonzero(kept))
+        return np.flatnonzero(kept)

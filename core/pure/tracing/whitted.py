@@ -70,16 +70,24 @@ class Whitted:
         Also count intersection tests and traversal steps.
     check : callable
         Called without arguments every few ten milliseconds; may raise Cancelled.
+    threshold : float
+        Dynamic recursion control: a ray whose weight in its pixel is less, in every colour, is not traced (Hall and
+        Greenberg 1983).
+    roulette : bool
+        Such a ray is traced with the probability weight / threshold, and then weighs `threshold` (Arvo and Kirk 1990):
+        noise, where leaving it out makes the picture too dark.
 
     Attributes
     ----------
     tally : dict
-        Per kind of ray: rays, hits, n_it, n_ts, n_ets, n_eets.
+        Per kind of ray: rays, hits, n_it, n_ts, n_ets, n_eets, and saved: rays not traced for their small weight.
     """
 
     tile_side = TILE
 
-    def __init__(self, scene, structures, size, depth, samples, seed, count, check):
+    def __init__(
+        self, scene, structures, size, depth, samples, seed, count, check, threshold=0.0, roulette=False
+    ):
         self.scene, self.size, self.depth, self.samples, self.seed, self.count = (
             scene,
             size,
@@ -88,11 +96,11 @@ class Whitted:
             seed,
             count,
         )
-        self.check = check
+        self.check, self.threshold, self.roulette = check, threshold, roulette and threshold > 0.0
         self.probe = {kind: Probe(s, count) for kind, s in structures.items()}
         self.surfaces = Surfaces(scene)
         self.ambient = scene.world.ambient_light()
-        self.tally = {kind: dict.fromkeys(("rays", "hits", *COUNTED), 0) for kind in KINDS}
+        self.tally = {kind: dict.fromkeys(("rays", "hits", "saved", *COUNTED), 0) for kind in KINDS}
         materials = scene.used_materials()
         self.bounces = depth > 0 and any(m.reflects for m in materials)
         self.transparent = any(m.transparent for m in materials)
@@ -124,13 +132,14 @@ class Whitted:
 
     def pixel(self, x, y, sample):
         """One sample of a pixel; what it returns is named as in :meth:`tile`."""
-        key = sampling.first_key(y * self.size[0] + x, sample, self.seed) if self.samples > 1 else None
-        o, d = primary(self.scene.camera, self.size, x, y, key)
+        random = self.samples > 1
+        key = sampling.first_key(y * self.size[0] + x, sample, self.seed) if random or self.roulette else None
+        o, d = primary(self.scene.camera, self.size, x, y, key if random else None)
         self.spent = dict.fromkeys(("rays_per_pixel", *(("n_it", "n_ts") if self.count else ())), 0)
         camera = self.scene.camera
         radiance, first = (0.0, 0.0, 0.0), None
         stack = [
-            Path(o, d, float(camera.near), float(camera.far), (1.0, 1.0, 1.0), 0, PRIMARY, key if self.soft else None)
+            Path(o, d, float(camera.near), float(camera.far), (1.0, 1.0, 1.0), 0, PRIMARY, key)
         ]
         while stack:
             path = stack.pop()
@@ -140,7 +149,7 @@ class Whitted:
             if surface is None:
                 radiance = add(radiance, mul(path.weight, self._sky(path.d)))
                 continue
-            seen = self._seen(surface, path.d, path.key)
+            seen = self._seen(surface, path.d, path.key if self.soft else None)
             radiance = add(radiance, mul(path.weight, times(surface.alpha, seen)))
             stack += self._onward(path, hit, surface)
         return {"combined": radiance, **self.spent, **({} if sample else self._first(*first))}
@@ -235,20 +244,25 @@ class Whitted:
             for kind, (direction, share) in zip((REFLECTED, REFRACTED), mirrored_and_refracted(surface, path.d)):
                 yield from self._spawn(path, surface, kind, direction, share, math.inf)
 
-    @staticmethod
-    def _spawn(path, surface, kind, direction, share, t_max):
+    def _spawn(self, path, surface, kind, direction, share, t_max):
         """Yield a ray from a surface, unless it has no weight."""
         weight = mul(path.weight, share)
         o = pushed(surface.point, surface.error, surface.normal, direction)
         # A ray that gets no further would go on for ever.
-        if max(weight) > 0.0 and t_max >= 0.0 and o != path.o:
-            yield Path(
-                o,
-                direction,
-                0.0,
-                t_max,
-                weight,
-                path.depth + (kind != TRANSPARENT),
-                kind,
-                None if path.key is None else sampling.branch(path.key, kind),
-            )
+        if not (max(weight) > 0.0 and t_max >= 0.0 and o != path.o):
+            return
+        key = None if path.key is None else sampling.branch(path.key, kind)
+        if self.threshold:
+            weight = self._worth(kind, weight, key)
+        if weight:
+            yield Path(o, direction, 0.0, t_max, weight, path.depth + (kind != TRANSPARENT), kind, key)
+
+    def _worth(self, kind, weight, key):
+        """The weight with which a ray is traced, or None if it is not."""
+        most = max(weight)
+        if most >= self.threshold:
+            return weight
+        if self.roulette and sampling.number(key, sampling.ROULETTE) * self.threshold < most:
+            return times(self.threshold / most, weight)
+        self.tally[KINDS[kind]]["saved"] += 1
+        return None
