@@ -8,6 +8,10 @@ from .errors import Notice, ParameterError
 REFERENCES_AT_LEAST = 1_000
 #: ... or this many a primitive, whichever is larger: primitives that overlap cannot be told apart by any division.
 REFERENCES_PER_PRIMITIVE = 64
+#: Unit directions of slabs: the axes, the diagonals of a cube, those of its faces.
+DIRECTIONS = tuple(tuple(x / math.sqrt(sum(map(abs, d))) for x in d) for d in (
+    (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0), (1.0, 1.0, 1.0), (1.0, 1.0, -1.0), (1.0, -1.0, 1.0), (-1.0, 1.0, 1.0),
+    (1.0, 1.0, 0.0), (1.0, -1.0, 0.0), (1.0, 0.0, 1.0), (1.0, 0.0, -1.0), (0.0, 1.0, 1.0), (0.0, 1.0, -1.0)))
 #: Positions along a cell that the sweep of a kd-tree tells apart.
 POSITIONS = 2**32
 #: Part of a cell's edge (of a grid), or of the root's longest edge (of a tree), by which cells overlap, so that a walk off
@@ -67,6 +71,12 @@ def too_many_slabs(need, slabs):
     """The message that lists of slabs would not fit."""
     return (f"separated-grid: lists of {' + '.join(map(str, slabs))} slabs would take {need / 2**30:.1f} GiB, more than half of the free "
             f"memory. Set intersect to sorted, or resolution to {max(slabs) // 2} or less.")
+
+
+def bsp_notice(references, n):
+    """What is said when a BSP tree degenerates."""
+    return Notice("bsp-tree", f"degenerates: {references} references to {n} primitives, because most planes cut many of them. "
+                  f"Use planes = slabs, a smaller max_depth, or a kd-tree.")
 
 
 def limit_notice(name, limit, lo, hi, level, count):

@@ -18,7 +18,7 @@ A kind is one file with one class. Its objects hold n primitives of the kind as 
 ``support(item, axis)``
     Exact extent (d, D) of primitives along the directions given, shape (n, 3).
 
-and may offer ``blocks(rays, ray, item, t_far)``, the pairs that hit, where that is cheaper than ``intersect``.
+and may offer ``outline(item)``, the corners of convex polygons, shape (m, 3, 3), and ``blocks(rays, ray, item, t_far)``, the pairs that hit, where that is cheaper than ``intersect``.
 """
 
 import numpy as np
@@ -126,6 +126,14 @@ class Primitives:
         for kind, at, own in self._by_kind(item):
             out_lo[at], out_hi[at] = kind.clip(own, lo[at], hi[at])
         return out_lo, out_hi
+
+    def outlines(self):
+        """The corners of all triangles, shape (n, 3, 3); NaN for other primitives."""
+        corners = np.full((self.n, 3, 3), np.nan)
+        for kind, start in zip(self.kinds, self.starts):
+            if hasattr(kind, "outline"):
+                corners[start:start + kind.n] = kind.outline(np.arange(kind.n))
+        return corners
 
     def support(self, item, axis):
         """Extents (d, D) of primitives along directions."""

@@ -64,6 +64,10 @@ class Triangles:
         a, b, c = self.xyz[0:3], self.xyz[3:6], self.xyz[6:9]
         return np.minimum(np.minimum(a, b), c).T, np.maximum(np.maximum(a, b), c).T
 
+    def hull(self, part):
+        """The corners of a slice of the triangles, shape (3, 3, m)."""
+        return self.xyz[:, part].reshape(3, 3, -1).transpose(1, 0, 2)
+
     def intersect(self, rays, ray, item, t_far):
         """Nearest hits of pairs; see the package's interface."""
         axes, origin, s = rays.shear
@@ -122,6 +126,10 @@ class Triangles:
     def rows(self, item):
         """The columns of some triangles: nine arrays."""
         return [row.take(item) for row in self.xyz]
+
+    def outline(self, item):
+        """Corners, shape (m, 3, 3)."""
+        return self.xyz[:, item].T.reshape(-1, 3, 3)
 
     def overlaps(self, item, lo, hi):
         """Bool per pair: whether the triangle touches the box (Akenine-Moller 2001: 13 separating axes)."""

@@ -227,7 +227,8 @@ class _Growth:
         for name in ("lo", "hi", "level", "parent"):
             setattr(t, name, np.concatenate(getattr(t, name)))
         t.level, t.parent = t.level.astype(np.int32), t.parent.astype(np.int32)
-        t.child, t.plane, t.count = np.full(t.n, -1, np.int32), np.full((3, t.n), np.inf), np.zeros(t.n, np.int32)
+        rows = len(self.divided[0][2]) if self.divided else 3
+        t.child, t.plane, t.count = np.full(t.n, -1, np.int32), np.full((rows, t.n), np.inf), np.zeros(t.n, np.int32)
         for parent, child, plane in self.divided:
             t.child[parent], t.plane[:, parent] = child, plane
         number, count, item = (np.concatenate(c) for c in zip(*self.leaves))

@@ -129,9 +129,13 @@ class CellTree(Structure):
             visits.everything(np.flatnonzero(far))
         ray = np.flatnonzero(inside & ~far)
         if len(ray):
-            with np.errstate(over="ignore", invalid="ignore"):
-                walk = Walk(self, rays, t_in, visits, query)
-                getattr(walk, self.parameters["walk"])(ray)
+            with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
+                self.walk(rays, ray, t_in, t_out, visits, query)
+
+    def walk(self, rays, ray, t_in, t_out, visits, query):
+        """The walk of some of the rays."""
+        walk = Walk(self, rays, t_in, visits, query)
+        getattr(walk, self.parameters["walk"])(ray)
 
     def locate_box(self, walk, ray, t):
         """The leaves in which rays are at t, searched from the root, and their boxes lo and hi."""

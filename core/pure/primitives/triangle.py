@@ -119,6 +119,10 @@ class Triangle(Primitive):
             length = -length
         return tuple(x / length for x in n)
 
+    def outline(self):
+        """The corners, as every kind that is a convex polygon may offer them."""
+        return [self.a, self.b, self.c]
+
     def overlaps(self, lo, hi):
         """Whether the triangle touches the box: 13 separating axes (Akenine-Moller 2001)."""
         centre = [0.5 * (l + h) for l, h in zip(lo, hi)]
