@@ -1,0 +1,216 @@
+"""The directory in the image plane: which primitives primary rays can meet, known before they are traced.
+
+The primitives' footprints in the camera's window are the directory, nearest first. Rays come as a grid of pixels, or
+anyhow through the window; footprints are looked up for all of them at once, as a z-buffer is filled: an exact item buffer
+(Weghorst, Hooper and Greenberg 1984). What the buffer names is then tested as every technique tests it, and whatever
+could still be nearer, or is too near to an edge to be excluded, is tested too: the hits are those of brute force.
+"""
+
+import numpy as np
+
+from .raster import Grid, spans
+from .second import Handing
+from .view import Footprints, View
+
+#: Side, in cells, of the tiles whose farthest hit hides what lies behind.
+TILE = 16
+#: Nearness that rays' hits lose in single precision, relative.
+LOSS = 2.0**-20
+
+
+class ImageDirectory(Handing):
+    """Footprints of all primitives in the camera's window."""
+
+    def build(self, progress):
+        camera = getattr(self.scene, "camera", None)
+        self.view = View.of_camera(camera) if camera is not None else None
+        if self.view is None:
+            self.notices.append(self.needs("a camera", "Add one, or name another technique for primary rays."))
+            return
+        self.feet = Footprints.of(self.view, self.primitives, progress)
+        self.figures.update(N_ER=len(self.feet), memory=self.feet.nbytes)
+
+    def traverse(self, rays, query):
+        if self.view is None:
+            self.hand_over(rays, query)
+            return
+        u, v, along, own = self._seen(rays)
+        if len(own) < rays.n:
+            other = np.ones(rays.n, bool)
+            other[own] = False
+            self.hand_over(rays, query, np.flatnonzero(other))
+        if len(own):
+            _Buffer(self.feet, rays, query, own, u, v, along, self.view.perspective).fill()
+
+    def _seen(self, rays):
+        """Where rays pass the window, their length along the viewing axis, and which of them come from the camera."""
+        view = self.view
+        x, y, z = view.directions(rays.d)
+        if view.perspective:
+            own = (rays.o[0] == view.position[0]) & (rays.o[1] == view.position[1]) & (rays.o[2] == view.position[2]) & (z > 0.0)
+            with np.errstate(all="ignore"):
+                u, v = x / z, y / z
+        else:
+            own = (z > 0.0) & (np.abs(x) + np.abs(y) <= 2.0**-46 * view.scale * np.abs(rays.d).max(axis=0))
+            u, v, start, _ = view.points(rays.o)
+            own &= np.abs(start) <= 2.0**-46 * view.scale * (np.abs(rays.o).max(axis=0) + view.extra)
+        own &= (np.abs(u) <= 1.0005) & (np.abs(v) <= 1.0005) & (rays.t_min >= 0.0)
+        if own.all():
+            return u, v, z, np.arange(rays.n)
+        own = np.flatnonzero(own)
+        return u[own], v[own], z[own], own
+
+
+class _Buffer:
+    """The item buffer of a batch of rays: the most promising footprint of each.
+
+    Attributes
+    ----------
+    ray : ndarray
+        Numbers of the rays in the batch.
+    best : ndarray, uint64
+        Per ray, nearness and footprint of what is nearest, 0 for none.
+    """
+
+    def __init__(self, feet, rays, query, ray, u, v, along, perspective):
+        self.feet, self.query, self.ray = feet, query, ray
+        self.along, self.perspective = along, perspective
+        self.u, self.v = u.astype(np.float32), v.astype(np.float32)
+        self.n = len(ray)
+        self.grid, self.offset = pixel_grid(u, v)
+        self.regular = self.grid is not None
+        if not self.regular:
+            self.grid = _cells_for(u, v)
+            cell = self.grid.cell(u, v)
+            key = np.sort(cell.astype(np.uint64) << np.uint64(32) | np.arange(self.n, dtype=np.uint64))
+            self.order = (key & np.uint64(0xFFFFFFFF)).astype(np.int64)
+            self.count = np.bincount(cell, minlength=self.grid.columns * self.grid.rows)
+            self.start = np.cumsum(self.count) - self.count
+        self.limit = self._limit(slice(None))
+
+    def _limit(self, which):
+        """Nearness that a hit must have to matter to rays, with something to spare."""
+        with np.errstate(all="ignore"):
+            z = self.query.t[self.ray[which]] * self.along[which]
+            if self.perspective:
+                return np.where(z >= 0.0, (1.0 - LOSS) / z, np.inf).astype(np.float32) * np.float32(1.0 - LOSS)
+            limit = np.where(z > -np.inf, -z - LOSS * np.abs(z), np.inf)
+            return limit.astype(np.float32)
+
+    def fill(self):
+        """Find the nearest footprints, test them, then all that may still matter."""
+        pairs = [pair for pair in self._pairs()]
+        if not pairs:
+            return
+        foot, ray, near = (np.concatenate(c) for c in zip(*pairs))
+        first = self._nearest(ray, near)
+        self._test(foot, ray, first)
+        rest = np.flatnonzero(near >= self.limit.take(ray))
+        tested = np.zeros(len(foot), bool)
+        tested[first] = True
+        rest = rest[~tested[rest]]
+        self._test(foot, ray, rest)
+
+    def _test(self, foot, ray, which):
+        """Test pairs exactly, and bring the limits of their rays up to date."""
+        if not len(which):
+            return
+        ray = ray.take(which)
+        self.query.test(self.ray.take(ray), self.feet.item.take(foot.take(which)))
+        if self.query.counts:
+            self.query.counts.steps(self.ray.take(ray))
+        self.limit[ray] = self._limit(ray)
+
+    def _nearest(self, ray, near):
+        """For each ray the pair of greatest nearness."""
+        bits = near.view(np.int32).astype(np.int64)
+        # Floats in the order of whole numbers, the negative ones too.
+        bits = np.where(bits < 0, np.int64(-0x80000000) - bits, bits) + np.int64(0x80000000)
+        key = bits << 31 | np.arange(len(near))
+        best = np.full(self.n, -1, np.int64)
+        np.maximum.at(best, ray, key)
+        best = best[best >= 0]
+        return best & 0x7FFFFFFF
+
+    def _pairs(self):
+        """Yield (footprints, rays, nearness) that may meet."""
+        feet = self.feet
+        for foot, cell in spans(feet, self.grid):
+            if self.regular:
+                ray = cell
+                if self.offset or self.grid.columns * self.grid.rows != self.n:
+                    ray = cell - self.offset
+                    keep = np.flatnonzero((ray >= 0) & (ray < self.n))
+                    foot, ray = foot.take(keep), ray.take(keep)
+                u, v = self.u.take(ray), self.v.take(ray)
+            else:
+                count = self.count.take(cell)
+                which = np.repeat(np.arange(len(cell)), count)
+                ends = np.cumsum(count)
+                place = np.arange(int(ends[-1])) + (self.start.take(cell) - (ends - count)).take(which)
+                foot, ray = foot.take(which), self.order.take(place)
+                u, v = self.u.take(ray), self.v.take(ray)
+                keep = np.flatnonzero(inside(feet, foot, u, v))
+                foot, ray, u, v = foot.take(keep), ray.take(keep), u.take(keep), v.take(keep)
+            near = feet.near_u.take(foot)
+            near *= u
+            v *= feet.near_v.take(foot)
+            near += v
+            near += feet.near.take(foot)
+            keep = np.flatnonzero(near >= self.limit.take(ray))
+            if len(keep) < len(near):
+                foot, ray, near = foot.take(keep), ray.take(keep), near.take(keep)
+            yield foot, ray, near
+
+
+def inside(feet, foot, u, v):
+    """Bool per pair: whether points are in footprints, as far as can be told in single precision."""
+    tiny = np.float32(2.0**-20)
+    low, high = u - tiny, u + tiny
+    answer = (high >= feet.u_lo.take(foot)) & (low <= feet.u_hi.take(foot))
+    answer &= (v + tiny >= feet.v_lo.take(foot)) & (v - tiny <= feet.v_hi.take(foot))
+    for p, q, left in ((feet.p0, feet.q0, True), (feet.p1, feet.q1, True), (feet.p2, feet.q2, False), (feet.p3, feet.q3, False)):
+        q = q.take(foot)
+        edge = q * v
+        edge += p.take(foot)
+        np.abs(q, out=q)
+        q *= tiny
+        answer &= high >= edge - q if left else low <= edge + q
+    return answer
+
+
+def pixel_grid(u, v):
+    """The grid whose cells points fill row by row, and the number of the first point's cell; None where there is none."""
+    n = len(u)
+    if n < 4:
+        return None, 0
+    du = u[1] - u[0]
+    k = np.arange(n)
+    with np.errstate(all="ignore"):
+        breaks = np.flatnonzero(~(np.abs(u - (u[0] + k * du)) < 0.5 * abs(du)))
+        if not len(breaks) or not du > 0.0:
+            return None, 0
+        w0 = int(breaks[0])
+        # A full row follows the first, which may be cut off.
+        second = u[w0:] - (u[w0] + k[:n - w0] * du)
+        again = np.flatnonzero(~(np.abs(second) < 0.5 * du))
+        width = max(int(again[0]) if len(again) else n - w0, w0)
+        offset = width - w0
+        j, i = np.divmod(k + offset, width)
+        rows = int(j[-1]) + 1
+        du = (u[i.argmax()] - u[w0]) / max(width - 1, 1)
+        dv = (v[-1] - v[0]) / max(rows - 1, 1)
+        u0, v0 = float(u[w0]), float(v[0])
+        half_u, half_v = float(np.abs(u - (u0 + i * du)).max()), float(np.abs(v - (v0 + j * dv)).max())
+    if not (du > 0.0 and dv > 0.0 and half_u <= 0.1 * du and half_v <= 0.1 * dv):
+        return None, 0
+    return Grid(width, rows, u0, v0, float(du), float(dv), half_u, half_v), offset
+
+
+def _cells_for(u, v):
+    """About as many cells as there are points, over the rectangle that the points fill."""
+    u_lo, u_hi, v_lo, v_hi = u.min(), u.max(), v.min(), v.max()
+    wide, high = max(u_hi - u_lo, 2.0**-16), max(v_hi - v_lo, 2.0**-16)
+    columns = int(np.clip(np.sqrt(len(u) * wide / high), 1, len(u)))
+    rows = int(np.clip(len(u) / columns, 1, len(u)))
+    return Grid.over(columns, rows, u_lo, u_lo + wide, v_lo, v_lo + high)
