@@ -4,8 +4,8 @@ import weakref
 
 import bpy
 
-from . import show
-from ..core.errors import Cancelled, RayscopeError
+from . import show, work
+from ..core.errors import Cancelled
 
 ENGINE = "RAYSCOPE"
 
@@ -50,18 +50,10 @@ class RayscopeRenderEngine(bpy.types.RenderEngine):
             self.register_pass(scene, renderlayer, name, len(channels), channels, kind)
 
     def render(self, depsgraph):
-        try:
-            self._render(depsgraph)
-        except Cancelled:
-            pass
-        except RayscopeError as error:
-            self._fail(str(error))
-        except MemoryError:
-            self._fail("There was not enough memory: make the picture smaller, or render with fewer passes.")
-
-    def _fail(self, text):
-        self.report({"ERROR"}, text)
-        self.error_set(text)
+        job = work.Job("Rendering", lambda progress: self._render(depsgraph)).run()
+        if job.error:
+            self.report({"ERROR"}, job.error)
+            self.error_set(job.error)
 
     def _render(self, depsgraph):
         import numpy as np

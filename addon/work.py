@@ -4,6 +4,7 @@ The thread runs core functions on numpy arrays and never touches bpy or gpu: the
 whoever started it looks at `fraction` and `running` from Blender's main thread.
 """
 
+import logging
 import threading
 import time
 
@@ -11,6 +12,17 @@ from ..core.errors import Cancelled, RayscopeError
 
 #: Seconds to wait for a cancelled thread when the add-on is disabled or another file is opened.
 PATIENCE = 10.0
+
+
+def explain(title, error):
+    """What a user reads about an exception, in one line."""
+    if isinstance(error, RayscopeError):
+        return str(error)
+    if isinstance(error, MemoryError):
+        return f"{title}: there was not enough memory. Use fewer primitives, a coarser structure or a smaller picture."
+    # A mistake of ours: the traceback goes to whoever debugs.
+    logging.getLogger(__name__).debug("%s", title, exc_info=error)
+    return f"{title}: internal error, please report it ({type(error).__name__}: {error})."
 
 
 class Job:
@@ -54,15 +66,8 @@ class Job:
             self.fraction = 1.0
         except Cancelled:
             self._stop.set()
-        except RayscopeError as error:
-            self.error = str(error)
-        except MemoryError:
-            self.error = f"{self.title}: there was not enough memory. Use fewer primitives, a coarser structure or a smaller picture."
         except Exception as error:
-            # A mistake of ours: the user reads one line; the traceback goes to whoever debugs.
-            import logging
-            logging.getLogger(__name__).debug("%s", self.title, exc_info=True)
-            self.error = f"{self.title}: internal error, please report it ({type(error).__name__}: {error})."
+            self.error = explain(self.title, error)
         return self
 
     def progress(self, fraction):

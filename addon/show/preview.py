@@ -12,7 +12,7 @@ from gpu_extras.presets import draw_texture_2d
 from .. import tasks, work
 from ..read import camera_from_view, read_scene
 from ..ui import redraw
-from ...core.errors import Cancelled, RayscopeError
+from ...core.errors import Cancelled
 
 #: Pixels of the view along a side of one traced pixel: a first impression, then finer.
 COARSENESS = (16, 4, 1)
@@ -122,8 +122,8 @@ class Preview:
                 self._read(depsgraph)
             if self._scene is not None:
                 self._look(context, region.width, region.height)
-        except RayscopeError as error:
-            self._message = str(error)
+        except Exception as error:
+            self._message = work.explain("Preview", error)
         engine.update_stats("Rayscope", self._status())
         self._paint(engine, depsgraph.scene, region)
         _keep_redrawing()

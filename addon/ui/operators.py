@@ -8,7 +8,6 @@ import bpy
 
 from . import redraw
 from .. import session, work
-from ...core.errors import RayscopeError
 
 #: Seconds between two looks at a job that runs.
 TICK = 0.05
@@ -33,8 +32,8 @@ class Work:
             self._interactive = True
             if self._task.estimate.seconds <= ASK_SECONDS:
                 return self._start(context)
-        except RayscopeError as error:
-            self.report({"ERROR"}, str(error))
+        except Exception as error:
+            self.report({"ERROR"}, work.explain(self.title, error))
             return {"CANCELLED"}
         return context.window_manager.invoke_props_dialog(self, width=420, title=self.bl_label, confirm_text="Go Ahead")
 
@@ -57,8 +56,8 @@ class Work:
                 job = work.Job(self.title, lambda progress: task(_both(progress, manager.progress_update))).run()
             finally:
                 manager.progress_end()
-        except RayscopeError as error:
-            self.report({"ERROR"}, str(error))
+        except Exception as error:
+            self.report({"ERROR"}, work.explain(self.title, error))
             return {"CANCELLED"}
         return self._end(task, job)
 

@@ -178,6 +178,43 @@ def test_an_error_is_one_line(scene, monkeypatch, capfd):
     assert "Traceback" not in capfd.readouterr().err
 
 
+def test_our_own_mistakes_are_one_line_too(scene, monkeypatch, capfd):
+    from bl_ext.user_default.rayscope.addon import tasks
+
+    def wrong(*arguments, **options):
+        raise KeyError("oops")
+
+    monkeypatch.setattr(tasks, "read_scene", wrong)
+    for operator in (bpy.ops.render.render, bpy.ops.rayscope.trace, bpy.ops.rayscope.build):
+        text = ""
+        try:
+            operator()
+        except RuntimeError as error:
+            text = str(error)
+        printed = capfd.readouterr()
+        text += printed.out + printed.err
+        assert "internal error, please report it (KeyError: 'oops')" in text and "Traceback" not in text, text
+
+
+def test_a_render_that_is_stopped_keeps_what_was_done(scene, tmp_path, monkeypatch):
+    scene.rayscope.samples = 1000
+    from bl_ext.user_default.rayscope.core.errors import Cancelled
+    from bl_ext.user_default.rayscope.core.rendering import Rendering
+
+    looks, check = [], Rendering._check
+
+    def stop(self):  # test_break itself cannot be replaced: Blender finds its own first
+        check(self)
+        looks.append(1)
+        if len(looks) > 30:
+            raise Cancelled("Stopped.")
+
+    monkeypatch.setattr(Rendering, "_check", stop)
+    picture = render(scene, tmp_path)["Combined"]
+    assert len(looks) == 31
+    assert picture[..., :3].std() > 0.05
+
+
 def test_panels_of_what_we_use_are_shown():
     shown = {panel.__name__ for panel in bpy.types.Panel.__subclasses__() if ENGINE in getattr(panel, "COMPAT_ENGINES", ())}
     assert shown >= {"EEVEE_MATERIAL_PT_context_material", "EEVEE_MATERIAL_PT_surface", "DATA_PT_EEVEE_light", "EEVEE_WORLD_PT_surface",
