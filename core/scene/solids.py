@@ -1,4 +1,4 @@
-"""Analytic solids: a kind (unit sphere, box, ...) under an affine matrix.
+"""Analytic solids: a kind (unit sphere, box, ...) under an affine matrix; and combinations of them (CSG).
 
 ``KINDS`` is the one table of kinds. A kind is one row here and one file in each core, which holds its arithmetic in
 the unit shape's own space. What both cores need alike (world matrices, their inverses, which solids can be used) is
@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ..errors import SceneError
+from .csg import DIFFERENCE, INTERSECTION, OPERATIONS, UNION, flatten, mesh_fault
 
 
 @dataclass(frozen=True)
@@ -50,6 +51,8 @@ KINDS = {k.name: k for k in (
     Kind("pyramid", "base (-1, -1, 0) to (1, 1, 0), apex (0, 0, 1)", lambda s: (PYRAMID_CORNERS, [])),
     Kind("polygon", "planar, by its corners; values: points, and normals where it is smooth", closed=lambda s: False),
     Kind("triangle", "a polygon of three corners; values: points, and normals where it is smooth", closed=lambda s: False),
+    Kind("mesh", "a closed mesh, as part of a combination; values: mesh"),
+    Kind("csg", "a combination"),
 )}
 
 #: Columns of a matrix, each scaled to length about 1, whose determinant is below this count as dependent.
@@ -92,6 +95,65 @@ class Solid:
         self.matrix = np.asarray(self.matrix, float)
         if self.matrix.shape != (4, 4):
             raise SceneError(f"{self.name or self.kind}: the matrix is 4 x 4, not of shape {self.matrix.shape}.")
+
+
+@dataclass
+class Combination:
+    """Two solids joined by a set operation (constructive solid geometry). Both must be closed.
+
+    Parameters
+    ----------
+    op : {"union", "intersection", "difference"}
+    left, right : Solid or Combination
+    name : str
+    prune : bool
+        Leave out what Cameron's S-bounds (1991) tell not to matter.
+
+    Raises
+    ------
+    SceneError
+        For an unknown operation.
+    """
+
+    op: str
+    left: object
+    right: object
+    name: str = ""
+    prune: bool = True
+
+    kind = "csg"
+
+    def __post_init__(self):
+        if self.op not in OPERATIONS:
+            raise SceneError(f"{self.name or 'Combination'}: there is no operation {self.op!r}. Operations: {', '.join(OPERATIONS)}.")
+
+
+def union(first, *others, **more):
+    """All that is in any of the solids."""
+    return _halves(UNION, [first, *others], more)
+
+
+def intersection(first, *others, **more):
+    """What is in all of the solids."""
+    return _halves(INTERSECTION, [first, *others], more)
+
+
+def difference(first, *others, **more):
+    """What is in the first solid and in none of the others."""
+    return Combination(DIFFERENCE, first, union(*others), **more) if others else first
+
+
+def _halves(op, parts, more):
+    """Solids combined half by half, so that the tree stays low; keywords of :class:`Combination` go to the root."""
+    if len(parts) == 1:
+        return parts[0]
+    half = (len(parts) + 1) // 2
+    return Combination(op, _halves(op, parts[:half], {}), _halves(op, parts[half:], {}), **more)
+
+
+def mesh(geometry, matrix=None, **more):
+    """A closed mesh as part of a combination."""
+    return Solid("mesh", _IDENTITY.copy() if matrix is None else matrix, values={"mesh": geometry}, **more)
 
 
 def sphere(centre, radius, **more):
@@ -191,6 +253,19 @@ class Placed:
         """One of the solids' values, as a column."""
         return np.array([s.values.get(name, default) for s in self.solids])
 
+    def take(self, index):
+        """Some of the solids."""
+        return Placed([self.solids[i] for i in index], self.matrix[..., index], self.origin[:, index], self.inverse[..., index],
+                      self.object_of[index], self.primitive_of[index])
+
+    def mesh_corners(self):
+        """World corners of the first solid's triangles, a closed mesh: shape (9, triangles); and whether they are turned inside out."""
+        own = self.solids[0].values["mesh"]
+        x, y, z = own.vertices.T
+        m, c = self.matrix[..., 0], self.origin[:, 0]
+        world = np.stack([m[r, 0] * x + m[r, 1] * y + m[r, 2] * z + c[r] for r in range(3)])
+        return np.concatenate([world[:, own.triangles[:, k]] for k in range(3)]), bool(self.mirrors()[0])
+
     def mirrors(self):
         """Bool per solid: whether its matrix turns left into right."""
         return _determinant(self.matrix) < 0.0
@@ -208,38 +283,44 @@ def place(objects, shapes):
     Returns
     -------
     dict
-        Name of the kind -> Placed, in the order of ``KINDS``.
+        Name of the kind -> Placed, in the order of ``KINDS``; of combinations, a list of Tree.
     """
-    by_kind = {}
-    for i, k in shapes:
-        by_kind.setdefault(objects[i].geometry.solids[k].kind, []).append((i, k))
     placed = {}
-    for kind in KINDS:
-        if kind not in by_kind:
+    for kind, rows in _by_kind(objects, shapes).items():
+        if kind == "csg":
+            trees = [tree for tree in (Tree.of(objects, *row) for row in rows) if not tree.fault()]
+            if trees:
+                placed[kind] = trees
             continue
-        columns = _placed(objects, by_kind[kind])
-        good = _usable(kind, columns)
-        if good.all():
-            placed[kind] = columns
-        elif good.any():
-            at = np.flatnonzero(good)
-            placed[kind] = Placed([columns.solids[i] for i in at], columns.matrix[..., at], columns.origin[:, at],
-                                  columns.inverse[..., at], columns.object_of[at], columns.primitive_of[at])
+        columns = _placed(objects, rows)
+        good = np.flatnonzero(_usable(kind, columns))
+        if len(good):
+            placed[kind] = columns.take(good)
     return placed
 
 
-def _placed(objects, shapes):
+def _by_kind(objects, shapes):
+    """Kind -> list of (object, index in its list, solid), in the order of ``KINDS``."""
+    found = {}
+    for i, k in shapes:
+        solid = objects[i].geometry.solids[k]
+        # A mesh alone is a tree of one leaf.
+        found.setdefault("csg" if solid.kind == "mesh" else solid.kind, []).append((i, k, solid))
+    return {kind: found[kind] for kind in KINDS if kind in found}
+
+
+def _placed(objects, rows):
     """World matrices of solids, by elementwise operations only: BLAS may sum in another order for another n."""
-    solids = [objects[i].geometry.solids[k] for i, k in shapes]
-    a = np.moveaxis(np.array([objects[i].matrix for i, _ in shapes], float), 0, -1)
+    solids = [s for _, _, s in rows]
+    a = np.moveaxis(np.array([objects[i].matrix for i, _, _ in rows], float), 0, -1)
     b = np.moveaxis(np.array([s.matrix for s in solids], float), 0, -1)
     with np.errstate(all="ignore"):
         product = [[a[r, 0] * b[0, c] + a[r, 1] * b[1, c] + a[r, 2] * b[2, c] for c in range(4)] for r in range(3)]
         matrix = np.array([row[:3] for row in product])
         origin = np.array([product[r][3] + a[r, 3] for r in range(3)])
         inverse = _inverse(matrix)
-    index = np.array(shapes, np.int64)
-    return Placed(solids, matrix, origin, inverse, index[:, 0].astype(np.int32), index[:, 1])
+    return Placed(solids, matrix, origin, inverse, np.array([i for i, _, _ in rows], np.int32),
+                  np.array([k for _, k, _ in rows], np.int64))
 
 
 def _determinant(m):
@@ -264,6 +345,50 @@ def _inverse(matrix):
     """Inverses of 3 x 3 matrices, shape (3, 3, n)."""
     scaled, exponent = _scaled(matrix)
     return np.ldexp(np.swapaxes(_cofactors(scaled), 0, 1) / _determinant(scaled), -exponent[:, None])
+
+
+@dataclass
+class Tree:
+    """A combination, placed into world space.
+
+    Attributes
+    ----------
+    nodes : list of tuple
+        See :mod:`~rayscope.core.scene.csg`.
+    leaves : list of Placed
+        From left to right, each of length one.
+    object, primitive : int
+        Object in the scene, index in its list.
+    prune : bool
+    """
+
+    nodes: list
+    leaves: list
+    object: int
+    primitive: int
+    prune: bool
+
+    @classmethod
+    def of(cls, objects, obj, primitive, solid):
+        """The tree of a combination, by its object."""
+        nodes, leaves = flatten(solid)
+        return cls(nodes, [_placed(objects, [(obj, primitive, leaf)]) for leaf in leaves], obj, primitive, getattr(solid, "prune", True))
+
+    def fault(self):
+        """What is wrong with one of its leaves, or an empty string."""
+        for leaf in self.leaves:
+            solid = leaf.solids[0]
+            name = f"{solid.name}: " if solid.name else ""
+            if solid.kind == "mesh":
+                mesh = solid.values["mesh"]
+                reason = mesh_fault(mesh)
+                if reason:
+                    return f"{name or mesh.name + ': '}cannot be part of a combination, {reason}"
+            elif not KINDS[solid.kind].closed(solid):
+                return f"{name}{solid.kind}: cannot be part of a combination, it encloses nothing"
+            if not _usable(solid.kind, leaf)[0]:
+                return name + _fault(leaf, 0)
+        return ""
 
 
 def _usable(kind, placed):
@@ -352,13 +477,12 @@ def faults(objects):
     from .scene import Mesh
     shapes = [(i, k) for i, o in enumerate(objects) if not isinstance(o.geometry, Mesh) for k in range(len(o.geometry))]
     found = []
-    by_kind = {}
-    for i, k in shapes:
-        by_kind.setdefault(objects[i].geometry.solids[k].kind, []).append((i, k))
-    for kind, own in by_kind.items():
-        placed = _placed(objects, own)
-        for at in np.flatnonzero(~_usable(kind, placed)):
-            found.append((*own[at], _fault(placed, at)))
+    for kind, rows in _by_kind(objects, shapes).items():
+        if kind == "csg":
+            found += [(i, k, text) for i, k, solid in rows if (text := Tree.of(objects, i, k, solid).fault())]
+            continue
+        placed = _placed(objects, rows)
+        found += [(*rows[at][:2], _fault(placed, at)) for at in np.flatnonzero(~_usable(kind, placed))]
     return sorted(found)
 
 
@@ -367,6 +491,8 @@ def _fault(placed, at):
     solid, matrix = placed.solids[at], placed.matrix[..., at]
     if not (np.isfinite(matrix).all() and np.isfinite(placed.origin[:, at]).all()):
         return f"{solid.kind}: its matrix holds NaN or infinite numbers"
+    if solid.kind == "mesh" and "mesh" not in solid.values:
+        return "mesh: it has no mesh"
     if "points" in solid.values:
         return f"{solid.kind}: {_polygon_fault(placed, at)}"
     flat = [axis for axis, size in zip("xyz", np.abs(matrix).max(axis=0)) if size == 0.0]
@@ -397,7 +523,7 @@ def bounds(solid):
 
 
 def extent(solid, axes):
-    """Exact extents (d, D) of a solid along directions in its list's space.
+    """Extents (d, D) of a solid along directions in its list's space: exact; of a combination, what its operands' tell.
 
     Parameters
     ----------
@@ -410,7 +536,19 @@ def extent(solid, axes):
         Least and greatest a . x over the solid.
     """
     axes = np.asarray(axes, float)
+    if solid.kind == "csg":
+        low, high = extent(solid.left, axes)
+        if solid.op != DIFFERENCE:
+            others = extent(solid.right, axes)
+            shrink = solid.op == INTERSECTION
+            low = (np.maximum if shrink else np.minimum)(low, others[0])
+            high = (np.minimum if shrink else np.maximum)(high, others[1])
+        return low, high
     m = solid.matrix
+    if solid.kind == "mesh":
+        own = solid.values["mesh"]
+        along = axes @ (own.vertices[np.unique(own.triangles)] @ m[:3, :3].T + m[:3, 3]).T
+        return along.min(axis=1), along.max(axis=1)
     if "points" in solid.values:
         along = axes @ (solid.values["points"] @ m[:3, :3].T + m[:3, 3]).T
         return along.min(axis=1), along.max(axis=1)
@@ -432,4 +570,4 @@ def extent(solid, axes):
 
 def slots(solid):
     """Material slots of a solid's parts, by their numbers: Hits.part tells which part's surface was met."""
-    return [solid.slot]
+    return [leaf.slot for leaf in flatten(solid)[1]] if solid.kind == "csg" else [solid.slot]

@@ -106,6 +106,8 @@ class Primitives:
 
     def surface(self, rays, item, t, u, v, detail):
         """What is at the hits: object, primitive, part, normal, point, error."""
+        if len(self.kinds) == 1:
+            return self.kinds[0].surface(rays, item, t, u, v, detail)
         n = len(item)
         columns = (np.zeros(n, np.int32), np.zeros(n, np.int64), np.zeros(n, np.int32), np.zeros((n, 3)), np.zeros((n, 3)), np.zeros(n))
         for kind, at, own in self._by_kind(item):

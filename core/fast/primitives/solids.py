@@ -18,7 +18,7 @@ STEPS = 32
 #: Name of a kind -> (file in this folder, its class).
 CLASSES = {"sphere": ("sphere", "Spheres"), "box": ("box", "Boxes"), "cylinder": ("cylinder", "Cylinders"),
            "cone": ("cone", "Cones"), "pyramid": ("pyramid", "Pyramids"), "polygon": ("polygon", "Polygons"),
-           "triangle": ("polygon", "triangles")}
+           "triangle": ("polygon", "triangles"), "csg": ("csg", "Trees")}
 
 
 def kinds_of(objects, shapes):
@@ -158,6 +158,11 @@ class UnitShapes:
         item = item[pair]
         u, v = self.parameters(self.project(o[:, pair] + t * d[:, pair], face, item), face, item)
         return pair, t, u, v, face
+
+    def coordinates(self, rays, ray, item, t, face):
+        """Surface parameters u, v where rays cross faces at t."""
+        o, d = self._to_unit(rays, ray, item)
+        return self.parameters(self.project(o + t * d, face, item), face, item)
 
     def blocks(self, rays, ray, item, t_far):
         """The pairs that hit."""

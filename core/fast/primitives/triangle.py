@@ -14,6 +14,10 @@ from ...scene.layout import mirrors, to_world
 GAMMA_7 = 7 * 2.0**-53 / (1 - 7 * 2.0**-53)
 
 
+#: Pairs tested together: columns that stay in the cache.
+PAIRS = 8_192
+
+
 class Triangles:
     """n triangles in world space.
 
@@ -70,37 +74,53 @@ class Triangles:
 
     def intersect(self, rays, ray, item, t_far):
         """Nearest hits of pairs; see the package's interface."""
+        if len(ray) > PAIRS:
+            parts = [self._hits(rays, ray[k:k + PAIRS], item[k:k + PAIRS], t_far) for k in range(0, len(ray), PAIRS)]
+            for k, (pair, *_) in enumerate(parts):
+                pair += k * PAIRS
+            return [np.concatenate(c) for c in zip(*parts)]
+        return self._hits(rays, ray, item, t_far)
+
+    def _hits(self, rays, ray, item, t_far):
+        """As :meth:`intersect`, all pairs at once."""
         axes, origin, s = rays.shear
-        flat, n = self._flat, self.n
-        kx, ky, kz = (axes[a].take(ray) * n + item for a in range(3))
-        ox, oy, oz = (origin[a].take(ray) for a in range(3))
-        sx, sy = s[0].take(ray), s[1].take(ray)
         x, y, z = [], [], []
-        for vertex in range(3):
-            w = flat.take(kz)
+        sx, sy = s[0].take(ray), s[1].take(ray)
+        ox, oy, oz = (origin[a].take(ray) for a in range(3))
+        if rays.main is not None:
+            rows = [[self.xyz[3 * vertex + axis] for axis in rays.main] for vertex in range(3)]
+            places = [[item] * 3] * 3
+        else:
+            flat, n = self._flat, self.n
+            own = [axes[a].take(ray) * n + item for a in range(3)]
+            rows = [[flat] * 3] * 3
+            places = [own, [k + 3 * n for k in own], [k + 6 * n for k in own]]
+        for row, (kx, ky, kz) in zip(rows, places):
+            w = row[2].take(kz)
             w -= oz
-            p = flat.take(kx)
+            p = row[0].take(kx)
             p -= ox
             p -= sx * w
-            q = flat.take(ky)
+            q = row[1].take(ky)
             q -= oy
             q -= sy * w
             x.append(p)
             y.append(q)
             z.append(w)
-            if vertex < 2:
-                kx += 3 * n
-                ky += 3 * n
-                kz += 3 * n
         u = x[2] * y[1] - y[2] * x[1]
         v = x[0] * y[2] - y[0] * x[2]
         w = x[1] * y[0] - y[1] * x[0]
         # All of one sign, zeros allowed.
         pair = np.flatnonzero((np.minimum(np.minimum(u, v), w) >= 0.0) | (np.maximum(np.maximum(u, v), w) <= 0.0))
-        u, v, w, hit_ray = u.take(pair), v.take(pair), w.take(pair), ray.take(pair)
-        x, y, z = ([column.take(pair) for column in axis] for axis in (x, y, z))
+        hit_ray = ray
+        if len(pair) < len(ray):
+            u, v, w, hit_ray = u.take(pair), v.take(pair), w.take(pair), ray.take(pair)
+            x, y, z = ([column.take(pair) for column in axis] for axis in (x, y, z))
         det = u + v + w
-        products = sum(np.abs(p * q) for p, q in ((x[2], y[1]), (y[2], x[1]), (x[0], y[2]), (y[0], x[2]), (x[1], y[0]), (y[1], x[0])))
+        products = np.zeros(len(pair))
+        for p, q in ((x[2], y[1]), (y[2], x[1]), (x[0], y[2]), (y[0], x[2]), (x[1], y[0]), (y[1], x[0])):
+            product = p * q
+            products += np.abs(product, out=product)
         # Seen edge-on, or hardly a triangle: the edge functions are little but rounding errors.
         doubtful = np.flatnonzero(np.abs(det) <= DOUBTFUL * products)
         for i in doubtful:
@@ -112,8 +132,11 @@ class Triangles:
         with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
             t = (u * (sz * z[0]) + v * (sz * z[1]) + w * (sz * z[2])) / det
         good = np.flatnonzero((t >= rays.t_min.take(hit_ray)) & (t <= t_far.take(hit_ray)) & np.isfinite(t))
-        pair, det = pair.take(good), det.take(good)
-        return pair, t.take(good), v.take(good) / det, w.take(good) / det, np.zeros(len(pair), np.int64)
+        if len(good) < len(pair):
+            pair, det, t, v, w = pair.take(good), det.take(good), t.take(good), v.take(good), w.take(good)
+        v /= det
+        w /= det
+        return pair, t, v, w, np.zeros(len(pair), np.int64)
 
     def surface(self, rays, item, t, u, v, detail):
         """Object, primitive, part, normal, point and error of hits."""

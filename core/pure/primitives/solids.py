@@ -19,7 +19,7 @@ STEPS = 32
 #: Name of a kind -> (file in this folder, what makes the list of its solids from placed ones).
 MAKERS = {"sphere": ("sphere", "Sphere"), "box": ("box", "Box"), "cylinder": ("cylinder", "Cylinder"),
           "cone": ("cone", "Cone"), "pyramid": ("pyramid", "Pyramid"), "polygon": ("polygon", "Polygon"),
-          "triangle": ("polygon", "ThreeCorners")}
+          "triangle": ("polygon", "ThreeCorners"), "csg": ("csg", "Tree")}
 
 
 def solids_of(objects, which):
@@ -152,6 +152,11 @@ class UnitShape(Primitive):
                 p = self.project([x + t * y for x, y in zip(o, d)], face)
                 return t, *self.parameters(p, face), face
         return None
+
+    def coordinates(self, ray, t, face):
+        """Surface parameters u, v where a ray crosses a face at t."""
+        o, d = self.to_unit(ray)
+        return self.parameters(self.project([x + t * y for x, y in zip(o, d)], face), face)
 
     def intersections(self, ray):
         """Where the line enters and leaves a closed shape, for CSG: (t_in, t_out, face_in, face_out), or None."""
