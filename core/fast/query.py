@@ -70,16 +70,20 @@ class Closest:
         better = np.flatnonzero((t < old_t) | ((t == old_t) & ((old_item < 0) | (item < old_item))))
         if not len(better):
             return
-        ray, item, t = ray.take(better), item.take(better), t.take(better)
+        if len(better) < len(ray):
+            ray, item, t, u, v, detail = (column.take(better) for column in (ray, item, t, u, v, detail))
+        if (ray[1:] > ray[:-1]).all():                  # one pair a ray
+            self.t[ray], self.item[ray], self.u[ray], self.v[ray], self.detail[ray] = t, item, u, v, detail
+            return
         np.minimum.at(self.t, ray, t)
         nearest = np.flatnonzero(t == self.t.take(ray))
-        ray, item, better = ray.take(nearest), item.take(nearest), better.take(nearest)
+        ray, item = ray.take(nearest), item.take(nearest)
         self.item[ray] = item
         # Of hits at the same t the assignment kept the last; give way to lower numbers until none is left.
         while len(lower := np.flatnonzero(self.item.take(ray) > item)):
             self.item[ray[lower]] = item[lower]
         mine = np.flatnonzero(self.item.take(ray) == item)
-        ray, better = ray.take(mine), better.take(mine)
+        ray, better = ray.take(mine), nearest.take(mine)
         self.u[ray], self.v[ray], self.detail[ray] = u.take(better), v.take(better), detail.take(better)
 
 

@@ -11,6 +11,8 @@ from .rays import Rays
 
 #: Rays traced at a time: enough to amortise numpy's calls, few enough for the caches.
 BATCH = 131_072
+#: Hits described at a time: columns that stay in the cache.
+SURFACES = 8_192
 
 
 def no_progress(fraction):
@@ -90,16 +92,16 @@ class Structure:
                     u=np.zeros(n), v=np.zeros(n), part=np.zeros(n, np.int32), normal=np.zeros((n, 3)),
                     point=np.zeros((n, 3)), error=np.zeros(n), **counts)
         for start, query in parts:
-            found = np.flatnonzero(query.item >= 0)
-            if not len(found):
-                continue
-            at = index[start + found]
-            batch = query.rays.take(found)
-            surface = self.primitives.surface(batch, query.item[found], query.t[found], query.u[found], query.v[found],
-                                              query.detail[found])
-            hits.t[at] = batch.callers_t(query.t[found])
-            hits.u[at], hits.v[at] = query.u[found], query.v[found]
-            (hits.object[at], hits.primitive[at], hits.part[at], hits.normal[at], hits.point[at], hits.error[at]) = surface
+            everything = np.flatnonzero(query.item >= 0)
+            for first in range(0, len(everything), SURFACES):
+                found = everything[first:first + SURFACES]
+                at = index.take(start + found)
+                batch = query.rays.take(found)
+                t, u, v = query.t.take(found), query.u.take(found), query.v.take(found)
+                surface = self.primitives.surface(batch, query.item.take(found), t, u, v, query.detail.take(found))
+                hits.t[at] = batch.callers_t(t)
+                hits.u[at], hits.v[at] = u, v
+                (hits.object[at], hits.primitive[at], hits.part[at], hits.normal[at], hits.point[at], hits.error[at]) = surface
         return hits
 
     def occluded(self, origins, directions, t_min=0.0, t_max=math.inf, count=False, progress=None):

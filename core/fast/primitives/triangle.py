@@ -117,12 +117,13 @@ class Triangles:
             u, v, w, hit_ray = u.take(pair), v.take(pair), w.take(pair), ray.take(pair)
             x, y, z = ([column.take(pair) for column in axis] for axis in (x, y, z))
         det = u + v + w
-        products = np.zeros(len(pair))
-        for p, q in ((x[2], y[1]), (y[2], x[1]), (x[0], y[2]), (y[0], x[2]), (x[1], y[0]), (y[1], x[0])):
-            product = p * q
-            products += np.abs(product, out=product)
         # Seen edge-on, or hardly a triangle: the edge functions are little but rounding errors.
-        doubtful = np.flatnonzero(np.abs(det) <= DOUBTFUL * products)
+        largest = [np.maximum(np.maximum(np.abs(a[0]), np.abs(a[1])), np.abs(a[2])) for a in (x, y)]
+        doubtful = np.flatnonzero(np.abs(det) <= (6.0 * DOUBTFUL) * largest[0] * largest[1])
+        if len(doubtful):
+            p, q = ([column.take(doubtful) for column in axis] for axis in (x, y))
+            products = sum(np.abs(p[i] * q[j]) for i, j in ((2, 1), (1, 2), (0, 2), (2, 0), (1, 0), (0, 1)))
+            doubtful = doubtful[np.abs(det.take(doubtful)) <= DOUBTFUL * products]
         for i in doubtful:
             corners = self.xyz[:, item[pair[i]]].reshape(3, 3).tolist()
             exact = watertight(*((float(x[k][i]), float(y[k][i])) for k in range(3)), *corners)
