@@ -54,6 +54,13 @@ class Hits:
         return np.asarray(self.primitive) >= 0
 
 
+_BOX = [(1, 0, 0), (0, 1, 0), (0, 0, 1)]
+_CORNERS = [(1, 1, 1), (1, -1, 1), (1, 1, -1), (1, -1, -1)]
+_EDGES = [(1, 1, 0), (1, 0, 1), (0, 1, 1), (1, -1, 0), (1, 0, -1), (0, 1, -1)]
+#: k -> directions of a k-DOP's slabs: normals of a cube's faces, then of its corners, then of its edges, cut off.
+KDOP_AXES = {6: _BOX, 14: _BOX + _CORNERS, 18: _BOX + _EDGES, 26: _BOX + _CORNERS + _EDGES}
+
+
 @dataclass
 class Cells:
     """The boxes of a structure, as an overlay draws them; every array has length c.
@@ -71,6 +78,11 @@ class Cells:
         Expected tests for a random ray that meets the root: area / root area x count for leaves, area / root area for inner nodes.
     parent : int64
         Index of the cell above, -1 at the root.
+    volume : str
+        What the cells really are: "box", or "sphere", "obb", "kdop"; lo and hi are then the boxes of what they hold.
+    shape : float64, shape (c, p), or None
+        Of other volumes than boxes. sphere: centre, radius. obb: three unit axes, low ends along them, high ends. kdop: low
+        ends along the directions of :data:`KDOP_AXES`, then high ends.
     """
 
     lo: np.ndarray
@@ -80,19 +92,22 @@ class Cells:
     leaf: np.ndarray
     cost: np.ndarray
     parent: np.ndarray
+    volume: str = "box"
+    shape: np.ndarray | None = None
 
     def __len__(self):
         return len(self.lo)
 
     @classmethod
-    def make(cls, lo, hi, level, count, leaf, parent):
-        """Cells from their boxes; the cost is computed here."""
+    def make(cls, lo, hi, level, count, leaf, parent, volume="box", shape=None, area=None):
+        """Cells from their boxes, or from other volumes with their surface areas; the cost is computed here."""
         lo, hi = np.asarray(lo, float).reshape(-1, 3), np.asarray(hi, float).reshape(-1, 3)
         count, leaf = np.asarray(count, np.int32), np.asarray(leaf, bool)
-        area = box_area(lo, hi)
+        area = box_area(lo, hi) if area is None else np.asarray(area, float)
         root = area[0] if len(area) and area[0] > 0 else 1.0
         return cls(lo, hi, np.asarray(level, np.int32), count, leaf,
-                   area / root * np.where(leaf, count, 1), np.asarray(parent, np.int64))
+                   area / root * np.where(leaf, count, 1), np.asarray(parent, np.int64), volume,
+                   None if shape is None else np.asarray(shape, float))
 
 
 def box_area(lo, hi):

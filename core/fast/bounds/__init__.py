@@ -9,6 +9,9 @@ from importlib import import_module
 import numpy as np
 
 EPSILON = 2.0**-52
+LARGEST = np.finfo(float).max
+#: Triangles whose length is more times their height are slivers.
+SLIVER = 16.0
 
 #: Name of a kind -> (file in this folder, class in it, keywords of its `fit`).
 KINDS = {
@@ -29,8 +32,8 @@ class Volumes:
 
     Attributes
     ----------
-    columns : ndarray, shape (c, n)
-        All numbers of the volumes.
+    columns : ndarray, shape (2 + c, n)
+        How rounding of rays grows in what is inside (`stretch` and `reach`, see :func:`margins`), then the kind's numbers.
     """
 
     #: Whether volumes around volumes (``joined``) are as tight as volumes around what is in them.
@@ -38,6 +41,13 @@ class Volumes:
 
     def __init__(self, columns):
         self.columns = columns
+        #: Whether rounding grows in any of them.
+        self.loose = bool((columns[0] > 0.0).any())
+
+    @property
+    def own(self):
+        """The kind's numbers, shape (c, n)."""
+        return self.columns[2:]
 
     def __len__(self):
         return self.columns.shape[1]
@@ -64,13 +74,16 @@ class Volumes:
         """Several sets of volumes of one kind as one."""
         return type(parts[0])(np.concatenate([p.columns for p in parts], axis=1))
 
-    @classmethod
-    def of_rays(cls, rays):
-        """What the test needs of rays: rows, shape (r, n)."""
+    def of_rays(self, rays):
+        """What tests need of rays: rows, shape (2 + r, n): rounding error of positions, t_min, and the kind's own."""
+        return np.concatenate([[16.0 * EPSILON * np.abs(rays.o).max(axis=0), rays.t_min], self.rows_of(rays)])
+
+    def rows_of(self, rays):
+        """What the kind's test needs of rays: rows, shape (r, n)."""
         raise NotImplementedError
 
-    def meet(self, volume, ray, t_far):
-        """The test: rows of columns of volumes and of rays, of shapes that go together.
+    def meet(self, volume, ray, slack, t_min, t_far):
+        """The test: the kind's own rows of volumes and of rays, of shapes that go together, met with `slack` to spare.
 
         Returns
         -------
@@ -93,13 +106,23 @@ class Volumes:
         met, t_in, t_out : ndarray
             The pairs that meet, and where.
         """
-        t_in, t_out = self.meet([c.take(which) for c in self.columns], [v.take(ray) for v in values], t_far)
-        met = np.flatnonzero(t_in <= t_out)
+        slack = values[0].take(ray)
+        if self.loose:
+            slack = slack + np.minimum(slack * self.columns[0].take(which), self.columns[1].take(which))
+        t_in, t_out = self.meet([c.take(which) for c in self.own], [v.take(ray) for v in values[2:]], slack, values[1].take(ray), t_far)
+        met = np.flatnonzero(meets(t_in, t_out))
         return met, t_in.take(met), t_out.take(met)
 
     def area(self):
         """Surface areas, shape (n,)."""
         raise NotImplementedError
+
+    #: What Cells call volumes of this kind.
+    DRAWN = "box"
+
+    def drawn(self):
+        """How Cells describe the volumes: the kind, and the shape unless it is a box."""
+        return self.DRAWN, None if self.DRAWN == "box" else self.own.T
 
     def boxes(self):
         """The boxes (lo, hi) around the volumes, each of shape (n, 3)."""
@@ -124,26 +147,64 @@ def maker(name):
     return lambda primitives, item, offset: class_.fit(primitives, item, offset, **keywords)
 
 
-def slack_of(primitives):
-    """How far outside each primitive, for rounding alone, its test may find a hit: shape (n,)."""
+def margins(primitives):
+    """How far outside primitives, for rounding alone, their tests may find hits.
+
+    Returns
+    -------
+    slack, stretch, reach : ndarray, shape (n,)
+        In space: `slack` whatever the ray, and min(stretch x the rounding error of positions on the ray, reach). The
+        latter two are 0 but for slivers.
+    """
     slack = 16.0 * EPSILON * np.maximum(np.abs(primitives.lo), np.abs(primitives.hi)).max(axis=1)
+    stretch, reach = np.zeros(primitives.n), np.zeros(primitives.n)
     for k, own in enumerate(primitives.kinds):
+        some = slice(primitives.starts[k], primitives.starts[k + 1])
         if hasattr(own, "inverse"):
             # A ray taken to the primitive's own space and back is off by the rounding errors of both maps.
             forth, back = (np.abs(m[:, :3]).sum(axis=1).max(axis=0) for m in (own.matrix, own.inverse))
-            slack[primitives.starts[k]:primitives.starts[k + 1]] *= forth * back
-    return slack
+            slack[some] *= forth * back
+        if own.KIND == "triangle":
+            stretch[some], reach[some] = _slivers(own.xyz)
+        elif own.KIND == "polygon":
+            slack[some] += own.corners.off_plane()[0]   # hits lie on the plane, corners need not
+        elif own.KIND == "instance":
+            inner = np.array([[a.max() for a in _slivers(s.primitives.kinds[0].xyz)] for s in own.structures]).reshape(-1, 2)[own.which]
+            stretch[some], reach[some] = inner[:, 0] * forth * back, inner[:, 1] * forth
+    return slack + np.minimum(stretch * slack, reach), stretch, reach
 
 
-def ray_slack(rays):
-    """Rounding error of positions on rays, in space."""
-    return 16.0 * EPSILON * np.abs(rays.o).max(axis=0)
+def _slivers(xyz):
+    """Stretch and reach of triangles (nine rows).
+
+    A triangle's test weighs its corners by areas; in one whose length is many times its height these are uncertain, and
+    so is the hit along its length.
+    """
+    with np.errstate(over="ignore", divide="ignore", invalid="ignore"):
+        e, f = xyz[3:6] - xyz[0:3], xyz[6:9] - xyz[0:3]
+        length = np.maximum(np.maximum(np.abs(e), np.abs(f)), np.abs(e - f)).max(axis=0)
+        scale = np.where(length > 0.0, length, 1.0)
+        e, f = e / scale, f / scale
+        area = np.abs([e[1] * f[2] - e[2] * f[1], e[2] * f[0] - e[0] * f[2], e[0] * f[1] - e[1] * f[0]]).max(axis=0)
+        sliver = (area * SLIVER < 1.0) & (length > 0.0)
+        return np.where(sliver, np.minimum(1.0 / area, 1e18), 0.0), np.where(sliver, length, 0.0)
+
+
+def columns(primitives, item, offset, own):
+    """Columns of volumes around segments of primitives: their stretch and reach, and the kind's `own` numbers."""
+    return np.concatenate([[np.maximum.reduceat(m[item], offset) for m in margins(primitives)[1:]], own])
+
+
+def meets(t_in, t_out):
+    """Whether an interval is one; outside a slab that it runs along, a ray has a bound at infinity."""
+    return (t_in <= t_out) & (t_in < np.inf) & (t_out > -np.inf)
 
 
 def between(t_in, t_out, low, high, origin, inverse):
     """Cut intervals of rays by slabs: the slab test (Kay and Kajiya 1986), made robust."""
     # Along a slab, 0 times infinity is NaN for an origin on its plane: minimum passes that on, fmax leaves it out.
     near, far = (low - origin) * inverse, (high - origin) * inverse
-    near, far = np.minimum(near, far), np.maximum(near, far)
+    # Minus infinity could not be widened.
+    near, far = np.minimum(near, far), np.maximum(np.maximum(near, far), -LARGEST)
     far += np.abs(far) * (2.0 * EPSILON)                # Ize 2013
     return np.fmax(t_in, near), np.fmin(t_out, far)

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from . import Volumes, maker
+from . import Volumes, maker, meets
 
 
 class _Combined(Volumes):
@@ -11,41 +11,31 @@ class _Combined(Volumes):
     Attributes
     ----------
     parts : list of Volumes
+    kinds : tuple of str
+        Their kinds.
     """
 
-    def __init__(self, parts):
-        self.parts = parts
-
-    def __len__(self):
-        return len(self.parts[0])
-
-    @property
-    def nbytes(self):
-        return sum(p.nbytes for p in self.parts)
-
-    @property
-    def columns(self):
-        """All numbers of the volumes."""
-        return np.concatenate([p.columns for p in self.parts])
+    def __init__(self, parts, kinds):
+        self.parts, self.kinds = parts, kinds
+        super().__init__(np.concatenate([np.maximum.reduce([p.columns[:2] for p in parts]), *(p.own for p in parts)]))
 
     def take(self, index):
-        return type(self)([p.take(index) for p in self.parts])
+        return type(self)([p.take(index) for p in self.parts], self.kinds)
 
     @staticmethod
     def concatenated(parts):
-        return type(parts[0])([p[0].concatenated(p) for p in zip(*(part.parts for part in parts))])
+        return type(parts[0])([p[0].concatenated(p) for p in zip(*(part.parts for part in parts))], parts[0].kinds)
 
-    def of_rays(self, rays):
-        return np.concatenate([p.of_rays(rays) for p in self.parts])
+    def rows_of(self, rays):
+        rows = [p.rows_of(rays) for p in self.parts]
+        self.rows = [len(r) for r in rows]
+        return np.concatenate(rows)
 
-    def meet(self, volume, ray, t_far):
-        rows = columns = 0
+    def meet(self, volume, ray, slack, t_min, t_far):
         met = []
-        for part in self.parts:
-            c = len(part.columns)
-            r = len(part.of_rays(NOTHING))
-            met.append(part.meet(volume[columns:columns + c], ray[rows:rows + r], t_far))
-            columns, rows = columns + c, rows + r
+        for part, rows in zip(self.parts, self.rows):
+            met.append(part.meet(volume[:len(part.own)], ray[:rows], slack, t_min, t_far))
+            volume, ray = volume[len(part.own):], ray[rows:]
         return self.combine(met)
 
 
@@ -54,10 +44,10 @@ class Intersections(_Combined):
 
     @classmethod
     def fit(cls, primitives, item, offset, kinds):
-        return cls([maker(k)(primitives, item, offset) for k in kinds])
+        return cls([maker(k)(primitives, item, offset) for k in kinds], kinds)
 
     def refitted(self, primitives, item, offset):
-        return Intersections([p.refitted(primitives, item, offset) for p in self.parts])
+        return Intersections([p.refitted(primitives, item, offset) for p in self.parts], self.kinds)
 
     def combine(self, met):
         return np.maximum.reduce([m[0] for m in met]), np.minimum.reduce([m[1] for m in met])
@@ -88,16 +78,16 @@ class Unions(_Combined):
         middle = offset + size // 2
         # Of a single primitive both parts are the same.
         first, second = (_pieces(item, a, b) for a, b in ((offset, np.maximum(middle, offset + 1)), (middle, offset + size)))
-        return cls([maker(k)(primitives, *piece) for k, piece in zip(kinds, (first, second))])
+        return cls([maker(k)(primitives, *piece) for k, piece in zip(kinds, (first, second))], kinds)
 
     def refitted(self, primitives, item, offset):
-        from .aabb import Aabbs
-        return self.fit(primitives, item, offset, tuple("aabb" for p in self.parts if isinstance(p, Aabbs)))
+        return self.fit(primitives, item, offset, self.kinds)
 
     def combine(self, met):
         # Missed parts must not open the interval.
-        t_in = np.minimum.reduce([np.where(a <= b, a, np.inf) for a, b in met])
-        return t_in, np.maximum.reduce([np.where(a <= b, b, -np.inf) for a, b in met])
+        there = [meets(*m) for m in met]
+        return (np.minimum.reduce([np.where(ok, m[0], np.inf) for ok, m in zip(there, met)]),
+                np.maximum.reduce([np.where(ok, m[1], -np.inf) for ok, m in zip(there, met)]))
 
     def area(self):
         """An upper bound: the sum of the parts' areas, or that of the box around both where it is less."""
@@ -115,12 +105,3 @@ def _pieces(item, start, end):
     size = end - start
     ends = np.cumsum(size)
     return item[np.repeat(start - (ends - size), size) + np.arange(ends[-1])], ends - size
-
-
-def _no_rays():
-    from ..rays import Rays
-    nothing = np.zeros((3, 0))
-    return Rays(nothing, nothing, np.zeros(0), np.zeros(0), np.zeros(0, int))
-
-
-NOTHING = _no_rays()

@@ -4,14 +4,10 @@ import itertools
 
 import numpy as np
 
-from . import EPSILON, Volumes, between, slack_of
+from ...hits import KDOP_AXES as AXES
+from . import EPSILON, Volumes, between, columns, margins
 from .aabb import box_area
 
-CORNERS = [(1, 1, 1), (1, -1, 1), (1, 1, -1), (1, -1, -1)]
-EDGES = [(1, 1, 0), (1, 0, 1), (0, 1, 1), (1, -1, 0), (1, 0, -1), (0, 1, -1)]
-BOX = [(1, 0, 0), (0, 1, 0), (0, 0, 1)]
-#: k -> directions of the slabs: normals of a cube's faces, then of its corners, then of its edges, cut off.
-AXES = {6: BOX, 14: BOX + CORNERS, 18: BOX + EDGES, 26: BOX + CORNERS + EDGES}
 #: Corners and edges that coincide but for this, relative to the size, are one (areas only).
 COINCIDE = 1e-12
 
@@ -19,38 +15,40 @@ COINCIDE = 1e-12
 class KDops(Volumes):
     """Columns: low ends of the slabs, then high ends."""
 
+    DRAWN = "kdop"
     JOINS = True
 
     @classmethod
     def fit(cls, primitives, item, offset, k):
         used = np.unique(item)
-        slack = slack_of(primitives)[used]
-        columns = np.empty((k, primitives.n))
+        slack = margins(primitives)[0][used]
+        ends = np.empty((k, primitives.n))
         for row, axis in enumerate(AXES[k]):
             a = np.array(axis, float)
             low, high = primitives.support(used, np.broadcast_to(a, (len(used), 3)))
-            columns[row, used], columns[row + k // 2, used] = low - slack * np.abs(a).sum(), high + slack * np.abs(a).sum()
-        return cls(columns[:, item]).joined(offset)
+            ends[row, used], ends[row + k // 2, used] = low - slack * np.abs(a).sum(), high + slack * np.abs(a).sum()
+        return cls(columns(primitives, item, np.arange(len(item)), ends[:, item])).joined(offset)
 
     def refitted(self, primitives, item, offset):
-        return self.fit(primitives, item, offset, len(self.columns))
+        return self.fit(primitives, item, offset, len(self.own))
 
     def joined(self, offset):
         """k-DOPs around segments of k-DOPs."""
-        half = len(self.columns) // 2
-        return KDops(np.concatenate([np.minimum.reduceat(self.columns[:half], offset, axis=1), np.maximum.reduceat(self.columns[half:], offset, axis=1)]))
+        half = len(self.own) // 2
+        return KDops(np.concatenate([np.maximum.reduceat(self.columns[:2], offset, axis=1), np.minimum.reduceat(self.own[:half], offset, axis=1),
+                                     np.maximum.reduceat(self.own[half:], offset, axis=1)]))
 
-    def of_rays(self, rays):
-        """Origins and reciprocal directions along the slabs, the rounding error of positions, t_min."""
-        axes = AXES[len(self.columns)]
+    def rows_of(self, rays):
+        """Origins and reciprocal directions along the slabs."""
+        axes = AXES[len(self.own)]
         along = [a[0] * rays.o[0] + a[1] * rays.o[1] + a[2] * rays.o[2] for a in axes]
         with np.errstate(divide="ignore"):
             inverse = [1.0 / (a[0] * rays.d[0] + a[1] * rays.d[1] + a[2] * rays.d[2]) for a in axes]
-        return np.stack([*along, *inverse, 64.0 * EPSILON * np.abs(rays.o).max(axis=0), rays.t_min])
+        return np.stack([*along, *inverse])
 
-    def meet(self, volume, ray, t_far):
-        half = len(self.columns) // 2
-        t_in, t_out, slack = ray[-1], t_far, ray[-2]
+    def meet(self, volume, ray, slack, t_min, t_far):
+        half = len(self.own) // 2
+        t_in, t_out, slack = t_min, t_far, 4.0 * slack
         with np.errstate(invalid="ignore", over="ignore"):
             for a in range(half):
                 # Speed along an oblique slab is rounded too; what that moves over the way to it grows with the slab's distance.
@@ -60,11 +58,11 @@ class KDops(Volumes):
         return t_in, t_out
 
     def area(self):
-        return _area(self.columns)
+        return _area(self.own)
 
     def boxes(self):
-        half = len(self.columns) // 2
-        return self.columns[:3].T, self.columns[half:half + 3].T
+        half = len(self.own) // 2
+        return self.own[:3].T, self.own[half:half + 3].T
 
 
 def _area(columns):

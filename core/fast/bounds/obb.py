@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from . import EPSILON, Volumes, between, slack_of
+from . import EPSILON, Volumes, between, columns, margins
 from .aabb import box_area
 from .hull import balls
 
@@ -12,6 +12,8 @@ SWEEPS = 6
 
 class Obbs(Volumes):
     """Columns: three unit axes of 3, low ends along them, high ends."""
+
+    DRAWN = "obb"
 
     @classmethod
     def fit(cls, primitives, item, offset):
@@ -23,40 +25,39 @@ class Obbs(Volumes):
     def _along(cls, axes, primitives, item, offset):
         """The boxes with given axes, shape (9, n)."""
         own = np.repeat(np.arange(len(offset)), np.diff(offset, append=len(item)))
-        slack = 4.0 * np.maximum.reduceat(slack_of(primitives)[item], offset)
+        slack = 4.0 * np.maximum.reduceat(margins(primitives)[0][item], offset)
         low, high = [], []
         for a in range(3):
             d, D = primitives.support(item, axes[3 * a:3 * a + 3, own].T)
             low.append(np.minimum.reduceat(d, offset) - slack)
             high.append(np.maximum.reduceat(D, offset) + slack)
-        return cls(np.concatenate([axes, low, high]))
+        return cls(columns(primitives, item, offset, [*axes, *low, *high]))
 
     def refitted(self, primitives, item, offset):
         """The same axes, other extents."""
-        return self._along(self.columns[:9], primitives, item, offset)
+        return self._along(self.own[:9], primitives, item, offset)
 
-    @classmethod
-    def of_rays(cls, rays):
-        return np.concatenate([rays.o, rays.d, [64.0 * EPSILON * np.abs(rays.o).max(axis=0), rays.t_min]])
+    def rows_of(self, rays):
+        return np.concatenate([rays.o, rays.d])
 
-    def meet(self, volume, ray, t_far):
-        t_in, t_out = ray[7], t_far
+    def meet(self, volume, ray, slack, t_min, t_far):
+        t_in, t_out, spare = t_min, t_far, 4.0 * slack
         with np.errstate(all="ignore"):
             for a in range(3):
                 x, y, z = volume[3 * a:3 * a + 3]
                 low, high = volume[9 + a], volume[12 + a]
                 along = x * ray[0] + y * ray[1] + z * ray[2]
                 inverse = 1.0 / (x * ray[3] + y * ray[4] + z * ray[5])
-                slack = ray[6] + 8.0 * EPSILON * np.maximum(np.abs(low), np.abs(high))
+                slack = spare + 8.0 * EPSILON * np.maximum(np.abs(low), np.abs(high))
                 t_in, t_out = between(t_in, t_out, low - slack, high + slack, along, inverse)
         return t_in, t_out
 
     def area(self):
-        return box_area(self.columns[12:] - self.columns[9:12])
+        return box_area(self.own[12:] - self.own[9:12])
 
     def boxes(self):
-        axes = self.columns[:9].reshape(3, 3, -1)
-        middle, half = 0.5 * (self.columns[9:12] + self.columns[12:]), 0.5 * (self.columns[12:] - self.columns[9:12])
+        axes = self.own[:9].reshape(3, 3, -1)
+        middle, half = 0.5 * (self.own[9:12] + self.own[12:]), 0.5 * (self.own[12:] - self.own[9:12])
         centre, reach = (axes * middle[:, None]).sum(axis=0), (np.abs(axes) * half[:, None]).sum(axis=0)
         return (centre - reach).T, (centre + reach).T
 

@@ -9,7 +9,7 @@ import itertools
 
 import numpy as np
 
-from . import EPSILON, Volumes, slack_of
+from . import EPSILON, Volumes, columns, margins
 from .hull import balls
 
 #: Steps after which the search is given up (rounding may make it go in circles); the sphere is then a little too large.
@@ -21,39 +21,40 @@ INSIDE = 1e-12
 class Spheres(Volumes):
     """Columns: centre x y z, radius."""
 
+    DRAWN = "sphere"
+
     @classmethod
     def fit(cls, primitives, item, offset):
         centre, radius, start = balls(primitives)
-        slack = np.maximum.reduceat(slack_of(primitives)[item], offset)
+        slack = np.maximum.reduceat(margins(primitives)[0][item], offset)
         count = np.diff(start)[item]
         ends = np.cumsum(count)
         place = np.repeat(start[item] - (ends - count), count) + np.arange(ends[-1])
         c, r = smallest(centre[:, place], radius[place], (ends - count)[offset])
-        return cls(np.concatenate([c, [r + 4.0 * slack + 64.0 * EPSILON * (np.abs(c).max(axis=0) + r)]]))
+        return cls(columns(primitives, item, offset, [*c, r + 4.0 * slack + 64.0 * EPSILON * (np.abs(c).max(axis=0) + r)]))
 
-    @classmethod
-    def of_rays(cls, rays):
+    def rows_of(self, rays):
         dd = rays.d[0] * rays.d[0] + rays.d[1] * rays.d[1] + rays.d[2] * rays.d[2]
-        return np.concatenate([rays.o, rays.d, [dd, 64.0 * EPSILON * np.abs(rays.o).max(axis=0), rays.t_min]])
+        return np.concatenate([rays.o, rays.d, [dd]])
 
-    def meet(self, volume, ray, t_far):
+    def meet(self, volume, ray, slack, t_min, t_far):
         x, y, z = volume[0] - ray[0], volume[1] - ray[1], volume[2] - ray[2]
         dd = ray[6]
         # The point of the ray nearest to the centre; the discriminant from there, since b * b - a * c would cancel.
         middle = (x * ray[3] + y * ray[4] + z * ray[5]) / dd
         x, y, z = x - middle * ray[3], y - middle * ray[4], z - middle * ray[5]
-        radius = volume[3] + ray[7]
+        radius = volume[3] + 4.0 * slack
         with np.errstate(invalid="ignore"):
             half = np.sqrt((radius * radius - (x * x + y * y + z * z)) / dd)
         loose = 4.0 * EPSILON * (np.abs(middle) + half)
         # NaN, where the root has failed, is no number below another: a miss.
-        return np.maximum(middle - half - loose, ray[8]), np.minimum(middle + half + loose, t_far)
+        return np.maximum(middle - half - loose, t_min), np.minimum(middle + half + loose, t_far)
 
     def area(self):
-        return 4.0 * np.pi * self.columns[3] ** 2
+        return 4.0 * np.pi * self.own[3] ** 2
 
     def boxes(self):
-        return (self.columns[:3] - self.columns[3]).T, (self.columns[:3] + self.columns[3]).T
+        return (self.own[:3] - self.own[3]).T, (self.own[:3] + self.own[3]).T
 
 
 def smallest(centre, radius, offset):

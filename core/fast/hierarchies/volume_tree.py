@@ -148,10 +148,10 @@ class VolumeStructure(Structure):
         """Take over a tree, put volumes around its nodes, and measure."""
         self.tree, self.volume = tree, volume
         fit = maker(volume)
-        self._fit(lambda node, item, offset: fit(self.primitives, item, offset))
+        self._put_volumes(lambda node, item, offset: fit(self.primitives, item, offset))
         self.measure()
 
-    def _fit(self, around):
+    def _put_volumes(self, around):
         """Volumes around all nodes; ``around(node, item, offset)`` makes those of some nodes around their primitives."""
         tree = self.tree
         levels = tree.levels()
@@ -195,7 +195,7 @@ class VolumeStructure(Structure):
         tree = self.tree
         item, offset = tree.segments(np.arange(len(tree.parent)))
         lo, hi = (f.reduceat(edge[item], offset) for f, edge in ((np.minimum, self.primitives.lo), (np.maximum, self.primitives.hi)))
-        return Cells.make(lo, hi, tree.level, tree.count, tree.leaf, tree.parent)
+        return Cells.make(lo, hi, tree.level, tree.count, tree.leaf, tree.parent, *self.volumes.drawn(), self.volumes.area())
 
     def refit(self, scene):
         """Follow motion: the same tree, its volumes fitted to where the primitives are now.
@@ -221,7 +221,7 @@ class VolumeStructure(Structure):
     def refit_volumes(self):
         """Fit the volumes to where the primitives are now, and measure."""
         old = self.volumes
-        self._fit(lambda node, item, offset: old.take(node).refitted(self.primitives, item, offset))
+        self._put_volumes(lambda node, item, offset: old.take(node).refitted(self.primitives, item, offset))
         self.measure()
 
 

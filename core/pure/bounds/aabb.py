@@ -1,6 +1,6 @@
 """The axis-aligned box."""
 
-from . import Volume, slack_of
+from . import Margin, Volume
 
 
 class Aabb(Volume):
@@ -14,22 +14,27 @@ class Aabb(Volume):
     JOINS = True
     __slots__ = ("lo", "hi")
 
-    def __init__(self, lo, hi):
-        self.lo, self.hi = lo, hi
+    def __init__(self, lo, hi, margin):
+        self.lo, self.hi, self.margin = lo, hi, margin
 
     @classmethod
     def around(cls, primitives):
-        slack = max(map(slack_of, primitives))
-        return cls(tuple(min(p.lo[axis] for p in primitives) - slack for axis in range(3)),
-                   tuple(max(p.hi[axis] for p in primitives) + slack for axis in range(3)))
+        margin = Margin.of(primitives)
+        return cls(tuple(min(p.lo[axis] for p in primitives) - margin.slack for axis in range(3)),
+                   tuple(max(p.hi[axis] for p in primitives) + margin.slack for axis in range(3)), margin)
 
     @classmethod
     def joined(cls, volumes):
         """The box around boxes."""
-        return cls(tuple(map(min, *(v.lo for v in volumes), volumes[0].lo)), tuple(map(max, *(v.hi for v in volumes), volumes[0].hi)))
+        return cls(tuple(map(min, *(v.lo for v in volumes), volumes[0].lo)), tuple(map(max, *(v.hi for v in volumes), volumes[0].hi)),
+                   Margin.joined(volumes))
 
     def enter(self, ray, t_far):
-        return ray.through_box(self.lo, self.hi, t_far)
+        lo, hi = self.lo, self.hi
+        if self.margin.stretch:
+            more = min(ray.slack * self.margin.stretch, self.margin.reach)
+            lo, hi = tuple(x - more for x in lo), tuple(x + more for x in hi)
+        return ray.through_box(lo, hi, t_far)
 
     def area(self):
         return box_area(self.lo, self.hi)

@@ -5,12 +5,16 @@ whenever its parent is: so a node may hold primitives beside its sub-volumes.
 """
 
 import heapq
+import math
 
 from ...errors import SceneError
 from ...hits import Cells
 from ..bounds import maker
 from ..primitives import primitives_of
 from ..structure import Structure, memory_of
+
+
+EMPTY = (math.inf,) * 3, (-math.inf,) * 3
 
 
 class Node:
@@ -68,14 +72,15 @@ class Tree(Structure):
         below = [list(node.items) for node in self.nodes]
         for node in reversed(self.nodes):               # children first
             own = [child.volume for child in node.children]
-            if node.bare:
-                pass
-            elif own and None not in own and own[0].JOINS:
+            if own and own[0].JOINS:
                 node.volume = own[0].joined(own)
             else:
                 node.volume = around(node, [self.primitives[i] for i in below[node.number]])
             if node.parent >= 0:
                 below[node.parent] += below[node.number]
+        for node in self.nodes:
+            if node.bare:
+                node.volume = None                      # it was there to be joined
 
     def around(self, node):
         """The volume that a ray must meet to enter a node."""
@@ -93,7 +98,8 @@ class Tree(Structure):
             c_GS=sum(area * (len(node.items) or sum(not c.bare for c in node.children)) for area, node in zip(areas, self.nodes)) / root)
 
     def walk(self, query):
-        (self._best_first if self.parameters.get("walk") == "best-first" else self._depth_first)(query)
+        if self.nodes:
+            (self._best_first if self.parameters.get("walk") == "best-first" else self._depth_first)(query)
 
     def _depth_first(self, query):
         """The nearer child first; the others wait on a stack and are dropped when a nearer hit is found."""
@@ -129,14 +135,23 @@ class Tree(Structure):
         return met
 
     def cells(self):
-        if not self.primitives:
+        if not self.primitives or not self.nodes:
             return super().cells()
         below = [len(node.items) for node in self.nodes]
+        boxes = [(node.items and self._box(node.items)) or EMPTY for node in self.nodes]
         for node in reversed(self.nodes[1:]):           # children before parents
             below[node.parent] += below[node.number]
-        boxes = [self.around(node).box() for node in self.nodes]
+            boxes[node.parent] = tuple(tuple(map(f, a, b)) for f, a, b in zip((min, max), boxes[node.parent], boxes[node.number]))
+        volumes = [self.around(node) for node in self.nodes]
+        drawn = volumes[0].DRAWN
         return Cells.make([lo for lo, _ in boxes], [hi for _, hi in boxes], [node.level for node in self.nodes], below,
-                          [not node.children for node in self.nodes], [node.parent for node in self.nodes])
+                          [not node.children for node in self.nodes], [node.parent for node in self.nodes],
+                          drawn, None if drawn == "box" else [v.shape() for v in volumes], [v.area() for v in volumes])
+
+    def _box(self, items):
+        """The box (lo, hi) of some primitives."""
+        some = [self.primitives[i] for i in items]
+        return tuple(map(min, *(p.lo for p in some), some[0].lo)), tuple(map(max, *(p.hi for p in some), some[0].hi))
 
     def refit(self, scene):
         """Follow motion: the same tree, its volumes fitted to where the primitives are now.
@@ -178,8 +193,8 @@ class Tree(Structure):
                 or len(self.primitives) != len(primitives)):
             raise changed(name)
         self.primitives = primitives
-        if primitives:
-            self.fit(lambda node, own: node.volume.refitted(own))
+        if primitives and self.nodes:
+            self.fit(lambda node, own: self.around(node).refitted(own))
             self.measure()
 
 
