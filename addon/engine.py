@@ -50,12 +50,16 @@ class RayscopeRenderEngine(bpy.types.RenderEngine):
             self.register_pass(scene, renderlayer, name, len(channels), channels, kind)
 
     def render(self, depsgraph):
-        job = work.Job("Rendering", lambda progress: self._render(depsgraph)).run()
+        written = []
+        job = work.Job("Rendering", lambda progress: self._render(depsgraph, written)).run()
+        if not written:  # without any result Blender 5.2 crashes when it writes the picture to a multilayer file
+            self.end_result(self.begin_result(0, 0, 1, 1, layer=depsgraph.view_layer.name))
         if job.error:
             self.report({"ERROR"}, job.error)
             self.error_set(job.error)
 
-    def _render(self, depsgraph):
+    def _render(self, depsgraph, written):
+        """Render a view layer; the tiles done are added to `written`."""
         import numpy as np
         from . import tasks
         scene, layer = depsgraph.scene, depsgraph.view_layer
@@ -84,6 +88,7 @@ class RayscopeRenderEngine(bpy.types.RenderEngine):
                     values = np.where(np.isfinite(values), values, FAR_AWAY)
                 target[name].rect.foreach_set(flat(values))
             self.end_result(result)
+            written.append((x0, y0, x1, y1))
 
         def progress(fraction):
             self.update_progress(fraction)

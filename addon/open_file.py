@@ -39,6 +39,7 @@ def open_file(path, size=None):
     SceneError
         When Blender cannot read the file.
     """
+    _know_settings()
     path = Path(path)
     is_blend = path.suffix.lower() == ".blend"
     try:
@@ -60,6 +61,14 @@ def open_file(path, size=None):
     scene = read_scene(bpy.context.evaluated_depsgraph_get(), camera=Camera(np.eye(4)))
     scene.camera, scene.name = None, path.name
     return scene
+
+
+def _know_settings():
+    """In the bpy module the add-on is not enabled: what it keeps in .blend files would not be seen."""
+    if not hasattr(bpy.types.Object, "rayscope"):
+        from .ui import primitives, properties
+        properties.register()
+        primitives.register_properties()
 
 
 def open_scene(size=None):

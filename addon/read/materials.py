@@ -19,6 +19,7 @@ class Read:
     material: Material
     uv_name: str | None = None
     colour_name: str | None = None
+    empty: bool = False  # the slot holds no material
 
 
 class Materials:
@@ -26,12 +27,17 @@ class Materials:
 
     def __init__(self, notices):
         self.notices = notices
-        self._read = {None: Read(Material("Default"))}  # an empty slot: Blender's grey
+        self._read = {None: Read(Material("Default"), empty=True)}  # an empty slot: Blender's grey
 
     def of(self, obj):
         """What an evaluated object's slots hold, as a tuple of :class:`Read`; at least one."""
-        slots = [s.material for s in obj.material_slots] or list(obj.data.materials)
-        return tuple(self._one(m) for m in slots) or (self._read[None],)
+        if obj.type == "EMPTY":  # a primitive: it has no slots
+            return self.of_slots([obj.rayscope.material])
+        return self.of_slots([s.material for s in obj.material_slots] or list(obj.data.materials))
+
+    def of_slots(self, materials):
+        """A list of Blender's evaluated materials, None for empty slots; at least one is returned."""
+        return tuple(self._one(m) for m in materials) or (self._read[None],)
 
     def _one(self, material):
         key = None if material is None else material.as_pointer()

@@ -46,6 +46,34 @@ def read_mesh(mesh):
     ), corners
 
 
+def face_corners(mesh):
+    """The faces of a mesh as polygons, face by face.
+
+    Returns
+    -------
+    points : ndarray, shape (C, 3), float64
+        Where the corners are.
+    normals : ndarray, shape (C, 3), or None
+        Shading normals there; None for a mesh of flat faces.
+    start : ndarray, shape (F + 1,)
+        The corners of face i are start[i] to start[i + 1].
+    slots : ndarray, shape (F,)
+        Material slots.
+    """
+    n = len(mesh.polygons)
+    if not n:
+        return np.zeros((0, 3)), None, np.zeros(1, np.int32), np.zeros(0, np.int32)
+    points = _attribute(mesh, "position", "vector", np.float32, 3)[_attribute(mesh, ".corner_vert", "value", np.int32)]
+    slots = _attribute(mesh, "material_index", "value", np.int32)
+    smooth = mesh.normals_domain != "FACE"
+    return (
+        points.astype(float),
+        _values(mesh.corner_normals, "vector", np.float32, 3) if smooth else None,
+        np.append(_values(mesh.polygons, "loop_start", np.int32), len(points)),
+        np.zeros(n, np.int32) if slots is None else slots,
+    )
+
+
 def read_corner_uvs(mesh, name=None):
     """Texture coordinates of every corner, (C, 2): of the layer named, else of the one used in renders; or None."""
     layers = mesh.uv_layers

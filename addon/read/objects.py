@@ -7,9 +7,11 @@ instances of meshes; each mesh is read once and shared.
 import numpy as np
 
 from ...core.scene.scene import Object
+from .booleans import Booleans
 from .lights import read_light
 from .materials import Materials
 from .meshes import read_corner_colours, read_corner_uvs, read_mesh
+from .primitives import Primitives, kind_of
 
 #: Types that give no triangles, and what they are called.
 NOT_TRACED = {
@@ -40,11 +42,14 @@ def read_objects(depsgraph, for_render, notices):
     hidden = _hidden_collections(depsgraph.view_layer) if sift else set()
     if sift:
         _note_missing(depsgraph, hidden, notices)
-    geometries, materials = Geometries(notices), Materials(notices)
+    materials = Materials(notices)
+    geometries = Geometries(depsgraph, materials, notices)
     objects, lights = [], []
     for instance in depsgraph.object_instances:
         obj = instance.object
-        if obj.type not in NOT_TRACED and obj.type not in {"MESH", "LIGHT"}:
+        if obj.type not in NOT_TRACED and obj.type not in {"MESH", "LIGHT", "EMPTY"}:
+            continue
+        if obj.type == "EMPTY" and kind_of(obj) == "none":
             continue
         if not instance.show_self or (sift and _hidden_in_renders(instance, hidden)):
             continue
@@ -53,9 +58,8 @@ def read_objects(depsgraph, for_render, notices):
         matrix = np.array(instance.matrix_world, float)
         if obj.type == "LIGHT":
             lights.append(read_light(obj, matrix, notices))
-        elif obj.type == "MESH":
-            own = materials.of(obj)
-            geometry = geometries.of(obj, own)
+        elif obj.type in {"MESH", "EMPTY"}:
+            geometry, own = geometries.of(obj)
             if len(geometry):
                 objects.append(Object(obj.name, geometry, matrix, tuple(m.material for m in own)))
         else:
@@ -64,18 +68,27 @@ def read_objects(depsgraph, for_render, notices):
 
 
 class Geometries:
-    """What objects consist of, each geometry once.
+    """What objects consist of, each geometry once: meshes, tagged primitives, and CSG trees of Boolean modifiers."""
 
-    An object is a mesh here; what else one could become (a CSG tree, an analytic solid) is decided in :meth:`of`.
-    """
-
-    def __init__(self, notices):
-        self.notices = notices
+    def __init__(self, depsgraph, materials, notices):
+        self.materials, self.notices = materials, notices
         self._meshes = {}
+        self._primitives = Primitives(notices)
+        self._booleans = Booleans(depsgraph, materials, notices)
+        settings = getattr(depsgraph.scene, "rayscope", None)
+        self._csg = settings is None or settings.csg
 
-    def of(self, obj, materials):
-        """The geometry of an evaluated object, with the corner data its materials look up."""
-        return self._mesh(obj, materials)
+    def of(self, obj):
+        """The geometry of an evaluated object, and its materials (a tuple of Read)."""
+        tagged = kind_of(obj) != "none"
+        if self._booleans.has(obj):
+            if self._csg and (tree := self._booleans.of(obj)):
+                return tree
+            if tagged:
+                self.notices.add(obj.name, "its primitive is replaced by Blender's Boolean of the mesh that stands in for it.")
+            tagged = False
+        own = self.materials.of(obj)
+        return self._primitives.of(obj) if tagged else self._mesh(obj, own), own
 
     def _mesh(self, obj, materials):
         # Pointers identify data only while the depsgraph stands still: within one read.

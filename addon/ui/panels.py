@@ -123,6 +123,7 @@ class Structure:
     def draw(self, context):
         layout, settings = self.start(), context.scene.rayscope
         draw_technique(layout, settings)
+        layout.prop(settings, "csg")
         draw_job(layout, "rayscope.build", "Build", "MOD_BUILD")
         built = session.built_of(context.scene)
         if built is not None:

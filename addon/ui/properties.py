@@ -128,6 +128,8 @@ class RAYSCOPE_PG_settings(bpy.types.PropertyGroup):
     seed: IntProperty(name="Seed", description="Start of the random numbers that place the samples; the same seed gives the same picture", min=0)
     count: BoolProperty(name="Count", description="Count intersection tests and traversal steps, for the figures and the render passes N_IT, N_TS and "
                         "Rays per Pixel; it takes some time", default=False)
+    csg: BoolProperty(name="CSG from Booleans", description="Trace objects with Boolean modifiers as CSG trees of their operands, closed meshes and "
+                      "Rayscope primitives; else, and where that is not possible, Blender's own Boolean mesh is traced", default=True)
     index_passes: BoolProperty(name="Indices", description="Render passes that number the object and the primitive seen, from 0; -1 where there is none",
                                default=False)
 

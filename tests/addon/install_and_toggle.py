@@ -57,7 +57,9 @@ def registered():
         rna = getattr(cls, "bl_rna", None)
         if rna is not None and issubclass(cls, (bpy.types.ID, bpy.types.WindowManager, bpy.types.ViewLayer, bpy.types.Camera)):
             state["properties"] |= {f"{name}.{key}" for key in rna.properties.keys()}
-        state["appended"] |= {f"{name}: {function.__qualname__}" for function in getattr(getattr(cls, "draw", None), "_draw_funcs", ())}
+        # The first append puts Blender's own function in front, where it stays.
+        state["appended"] |= {f"{name}: {function.__qualname__}" for function in getattr(getattr(cls, "draw", None), "_draw_funcs", ())
+                              if not function.__module__.startswith("bl_ui.")}
         state["compatible engines"] |= {f"{name}: {engine}" for engine in getattr(cls, "COMPAT_ENGINES", ())}
     configurations = bpy.context.window_manager.keyconfigs
     if configurations.addon:
