@@ -35,8 +35,9 @@ class Layout:
     instances: list
 
     @classmethod
-    def of(cls, objects, copies_at_most=COPIES_AT_MOST):
-        """Decide for a list of objects."""
+    def of(cls, objects, copies_at_most=None):
+        """Decide for a list of objects; None stands for COPIES_AT_MOST."""
+        copies_at_most = COPIES_AT_MOST if copies_at_most is None else copies_at_most
         users = {}
         for i, o in enumerate(objects):
             if isinstance(o.geometry, Mesh) and len(o.geometry):
@@ -109,8 +110,10 @@ def _local_corners(geometry):
         points = geometry.vertices[referenced]
         lo, hi = points.min(axis=0), points.max(axis=0)
     else:
-        from .solids import bounds
-        boxes = [bounds(s) for s in geometry.solids]
+        from .scene import Object
+        from .solids import bounds, faults
+        bad = {k for _, k, _ in faults([Object("", geometry)])}
+        boxes = [bounds(s) for k, s in enumerate(geometry.solids) if k not in bad]
         if not boxes:
             return None
         lo, hi = np.min([b[0] for b in boxes], axis=0), np.max([b[1] for b in boxes], axis=0)

@@ -447,6 +447,7 @@ def test_bad_solids_are_named_and_left_out(core):
         assert f"solid {k}" in scene.notices[k].name and text in scene.notices[k].text
     hits = build(scene, "brute", core=core).closest([(0, 0, 0)], [(0, 0, 1)])
     assert hits.t[0] == 8.0 and hits.primitive[0] == len(bad)
+    np.testing.assert_allclose(scene.bounds(), [(-1, -1, 8), (1, 1, 10)])
     flat = Scene(objects=[Object("flat", Shapes([solids.sphere(O, 1.0)]), np.diag([1.0, 1.0, 0.0, 1.0]))])
     assert flat.notices[0].name.startswith("flat") and "zero along its own z" in flat.notices[0].text
     assert build(flat, "brute", core=core).closest([(0, 0, 5)], [(0, 0, -1)]).t[0] == math.inf
