@@ -394,6 +394,50 @@ def bench_verb(call):
     return Outcome(bench.text(record), record, FAILED if result["failed"] else DONE)
 
 
+# --- stability --------------------------------------------------------------------------------------------------------
+
+def stability_options(sub):
+    sub.add_argument("--out", metavar="DIR", help="write tables, plots, and a file for each failing case there")
+    sub.add_argument("--seconds", metavar="S", type=whole(1, 10**6), help="begin no case later than this")
+    sub.add_argument("--techniques", metavar="A,B", help="only these")
+    sub.add_argument("--cases", metavar="A,B", help="only these")
+    sub.add_argument("--small", action="store_true", help="as in the tests: few powers of ten, few rays")
+    sub.add_argument("--seed", type=whole(0, 2**31 - 1), default=0)
+    sub.add_argument("--replay", metavar="FILE", help="run the failing case of this file again")
+
+
+def stability_verb(call):
+    """All techniques on stiff and extreme cases."""
+    from .lab import stability
+
+    if call.replay:
+        result = stability.replay(call.replay, say=say)
+        lines = [f"ray {r['number']}: brute force {r['brute']}, found {r['found']}, exact t {r['exact']}" for r in result["rays"]]
+        text = "\n".join([*lines, f"{result['row']['case']}: {result['row']['technique']} ({result['row']['core']}) against brute force: {result['row']['verdict']}",
+                          f"brute force against exact arithmetic: {result['truth']['verdict']}"])
+        return Outcome(text, report.record("stability", parameters={"replay": call.replay}, **result), FAILED if result["failed"] else DONE)
+    names = call.techniques.split(",") if call.techniques else None
+    for name in names or ():
+        technique(name)
+    if call.out:
+        report.folder(call.out)
+    only = call.cases.split(",") if call.cases else None
+    result = stability.run(not call.small, call.seed, names, only, call.seconds, say=say)
+    asked = {"techniques": call.techniques, "cases": call.cases, "seconds": call.seconds, "small": call.small}
+    record = report.record("stability", None, call.seed, asked, **result)
+    text = [stability.text(result)]
+    for line in result["left_out"]:
+        say(f"left out: {line}")
+    if call.out:
+        files, note = stability.write(result, call.out, say)
+        path = Path(call.out) / "stability.json"
+        path.write_text(report.to_json(record) + "\n", encoding="utf-8")
+        text += ["", *(f"written: {f}" for f in (*files, path))]
+        if note:
+            say(note)
+    return Outcome("\n".join(text), record, FAILED if result["failed"] else DONE)
+
+
 @dataclass(frozen=True)
 class Verb:
     """One verb.
@@ -420,4 +464,5 @@ VERBS = {
     "trace": Verb("trace a picture", trace_verb, trace_options),
     "compare": Verb("run techniques on the same rays; table, CSV, JSON, plots", compare_verb, compare_options),
     "bench": Verb("measure against mathutils' BVHTree and Embree", bench_verb, bench_options, scene=False),
+    "stability": Verb("run techniques on stiff and extreme cases against exact arithmetic", stability_verb, stability_options, scene=False),
 }
