@@ -16,6 +16,10 @@ from .view import Footprints, View
 TILE = 16
 #: Nearness that rays' hits lose in single precision, relative.
 LOSS = 2.0**-20
+#: Rows of pixels longer than this are not recognised.
+WIDEST = 16_384
+#: Pairs of footprints and rays collected before they are tested.
+PAIRS = 262_144
 
 
 class ImageDirectory(Handing):
@@ -77,16 +81,20 @@ class _Buffer:
         self.along, self.perspective = along, perspective
         self.u, self.v = u.astype(np.float32), v.astype(np.float32)
         self.n = len(ray)
+        self.tiles = None
         self.grid, self.offset = pixel_grid(u, v)
         self.regular = self.grid is not None
         if not self.regular:
             self.grid = _cells_for(u, v)
-            cell = self.grid.cell(u, v)
+            cell = self.cell = self.grid.cell(u, v)
             key = np.sort(cell.astype(np.uint64) << np.uint64(32) | np.arange(self.n, dtype=np.uint64))
             self.order = (key & np.uint64(0xFFFFFFFF)).astype(np.int64)
             self.count = np.bincount(cell, minlength=self.grid.columns * self.grid.rows)
             self.start = np.cumsum(self.count) - self.count
-        self.limit = self._limit(slice(None))
+        self.limit = np.full(self.n, 0.0 if perspective else -np.inf, np.float32)
+        near = np.flatnonzero(query.t[ray] < np.inf)
+        if len(near):
+            self.limit[near] = self._limit(near)
 
     def _limit(self, which):
         """Nearness that a hit must have to matter to rays, with something to spare."""
@@ -98,18 +106,51 @@ class _Buffer:
             return limit.astype(np.float32)
 
     def fill(self):
-        """Find the nearest footprints, test them, then all that may still matter."""
-        pairs = [pair for pair in self._pairs()]
+        """Collect pairs, footprints nearest first, and test them when there are enough."""
+        pairs, waiting = [], 0
+        for pair in self._pairs():
+            pairs.append(pair)
+            waiting += len(pair[0])
+            if waiting > PAIRS:
+                self._settle(pairs)
+                self._hide()
+                pairs, waiting = [], 0
+        self._settle(pairs)
+
+    def _settle(self, pairs):
+        """Test the nearest footprint of each ray, then all that may still matter."""
         if not pairs:
             return
         foot, ray, near = (np.concatenate(c) for c in zip(*pairs))
         first = self._nearest(ray, near)
         self._test(foot, ray, first)
-        rest = np.flatnonzero(near >= self.limit.take(ray))
-        tested = np.zeros(len(foot), bool)
-        tested[first] = True
-        rest = rest[~tested[rest]]
-        self._test(foot, ray, rest)
+        near[first] = -np.inf
+        self._test(foot, ray, np.flatnonzero((near >= self.limit.take(ray)) & (near > -np.inf)))
+
+    def _hide(self):
+        """Find out what tiles of cells hide: all whose nearness is less than what each ray in the tile has met."""
+        cells = np.full(self.grid.rows * self.grid.columns, np.inf, np.float32)
+        if self.regular:
+            cells[self.offset:self.offset + self.n] = self.limit
+        else:
+            np.minimum.at(cells, self.cell, self.limit)
+        rows, columns = -(-self.grid.rows // TILE), -(-self.grid.columns // TILE)
+        padded = np.full((rows * TILE, columns * TILE), np.inf, np.float32)
+        padded[:self.grid.rows, :self.grid.columns] = cells.reshape(self.grid.rows, self.grid.columns)
+        self.tiles = padded.reshape(rows, TILE, columns, TILE).min(axis=(1, 3))
+        self.least = self.tiles.min()
+
+    def hidden(self, some, i0, i1, j0, j1):
+        """Bool per footprint that reaches from column i0 to i1, row j0 to j1: whether nearer hits hide it."""
+        nearest = self.feet.nearest.take(some)
+        if self.tiles is None:
+            return np.zeros(len(some), bool)
+        a, b, c, d = i0 // TILE, i1 // TILE, j0 // TILE, j1 // TILE
+        t = self.tiles
+        least = np.minimum(np.minimum(t[c, a], t[c, b]), np.minimum(t[d, a], t[d, b]))
+        # Larger ones reach into tiles between these.
+        least[(b > a + 1) | (d > c + 1)] = self.least
+        return nearest < least
 
     def _test(self, foot, ray, which):
         """Test pairs exactly, and bring the limits of their rays up to date."""
@@ -135,7 +176,7 @@ class _Buffer:
     def _pairs(self):
         """Yield (footprints, rays, nearness) that may meet."""
         feet = self.feet
-        for foot, cell in spans(feet, self.grid):
+        for foot, cell in spans(feet, self.grid, self.hidden):
             if self.regular:
                 ray = cell
                 if self.offset or self.grid.columns * self.grid.rows != self.n:
@@ -185,23 +226,35 @@ def pixel_grid(u, v):
     if n < 4:
         return None, 0
     du = u[1] - u[0]
-    k = np.arange(n)
+    k = np.arange(min(n, WIDEST), dtype=float)
     with np.errstate(all="ignore"):
-        breaks = np.flatnonzero(~(np.abs(u - (u[0] + k * du)) < 0.5 * abs(du)))
+        breaks = np.flatnonzero(~(np.abs(u[:WIDEST] - (u[0] + k * du)) < 0.5 * abs(du)))
         if not len(breaks) or not du > 0.0:
             return None, 0
         w0 = int(breaks[0])
         # A full row follows the first, which may be cut off.
-        second = u[w0:] - (u[w0] + k[:n - w0] * du)
+        second = u[w0:w0 + WIDEST]
+        second = second - (second[0] + k[:len(second)] * du)
         again = np.flatnonzero(~(np.abs(second) < 0.5 * du))
-        width = max(int(again[0]) if len(again) else n - w0, w0)
+        width = max(int(again[0]) if len(again) else len(second), w0)
         offset = width - w0
-        j, i = np.divmod(k + offset, width)
-        rows = int(j[-1]) + 1
-        du = (u[i.argmax()] - u[w0]) / max(width - 1, 1)
+        rows = -(-(n + offset) // width)
+        at = (width - 1 if rows > 1 else n - 1) - offset if w0 > 1 else n - 1
+        du = (u[at] - u[0]) / max(at, 1) if w0 > 1 else du
         dv = (v[-1] - v[0]) / max(rows - 1, 1)
-        u0, v0 = float(u[w0]), float(v[0])
-        half_u, half_v = float(np.abs(u - (u0 + i * du)).max()), float(np.abs(v - (v0 + j * dv)).max())
+        u0, v0 = float(u[0] - offset * du), float(v[0])
+        half_u = half_v = 0.0
+        for j in range(rows):
+            a, b = max(0, j * width - offset), min(n, (j + 1) * width - offset)
+            i = a + offset - j * width
+            row = u[a:b] - (u0 + i * du)
+            row -= k[:b - a] * du
+            half_u = max(half_u, float(row.max()), -float(row.min()))
+            row = v[a:b]
+            middle = v0 + j * dv
+            half_v = max(half_v, float(row.max()) - middle, middle - float(row.min()))
+            if not (half_u <= 0.1 * du and half_v <= 0.1 * dv):
+                return None, 0
     if not (du > 0.0 and dv > 0.0 and half_u <= 0.1 * du and half_v <= 0.1 * dv):
         return None, 0
     return Grid(width, rows, u0, v0, float(du), float(dv), half_u, half_v), offset

@@ -1,0 +1,146 @@
+"""Directional techniques: rays they are made for, and all others; the hits are those of brute force."""
+import functools
+import math
+
+import numpy as np
+import pytest
+from rayscope.core import Scene, build, solids
+from rayscope.core.scene.camera import Camera
+from rayscope.core.scene.light import Light
+from rayscope.core.scene.scene import Object, Shapes
+
+from .datasets import DATASETS, jittered_sphere, points_of, rays_for
+from .test_properties import BY_NAME, answers, assert_same_hits, index_of as any_index, reference, scene_of
+
+CORES = ("fast",)
+CAMERAS = {
+    "in front": {},
+    "shifted": {"window": (0.1, 0.9, -0.7, -0.2)},
+    "orthographic": {"kind": "orthographic", "window": (-0.8, 0.7, -0.6, 0.9)},
+    "inside": {"inside": True, "window": (-2.0, 2.0, -2.0, 2.0)},
+    "telephoto": {"window": (-1e-3, 1e-3, -2e-3, 1e-3)},
+}
+
+
+def camera_for(scene, name, rng):
+    """A camera that sees something of a scene."""
+    more = dict(CAMERAS[name])
+    points = points_of(scene)
+    lo, hi = points.min(axis=0), points.max(axis=0)
+    centre, size = 0.5 * (lo + hi), float((hi - lo).max()) or 1.0
+    away = 0.1 if more.pop("inside", False) else 1.2
+    if more.get("kind") == "orthographic":
+        more["window"] = tuple(w * size for w in more["window"])
+    camera = Camera.look_at(centre + away * size * rng.normal(size=3), points[rng.integers(len(points))])
+    return Camera(camera.matrix, **{"window": camera.window, **more})
+
+
+@functools.cache
+def viewed(name, view, core, technique="image-directory"):
+    """A data set with a camera, a technique over it, and brute force."""
+    scene = scene_of(name)[0]
+    camera = camera_for(scene, view, np.random.default_rng([3, *name.encode(), *view.encode()]))
+    scene = Scene(scene.objects, camera=camera)
+    with pytest.MonkeyPatch.context() as patch:
+        if BY_NAME[name].instanced:
+            from rayscope.core.scene.layout import Layout
+            patch.setattr(Layout, "of", functools.partial(Layout.of, copies_at_most=0))
+        return scene, build(scene, technique, core), build(scene, "brute", "fast")
+
+
+def pixels(camera, size, jitter=None):
+    y, x = np.indices(size[::-1])
+    u, v = (0.5, 0.5) if jitter is None else jitter.random((2, x.size))
+    return camera.rays(x.ravel() + u, y.ravel() + v, size)
+
+
+def same(got, expected):
+    for field in ("t", "object", "primitive", "u", "v"):
+        a, b = np.asarray(getattr(got, field)), np.asarray(getattr(expected, field))
+        assert np.array_equal(a, b), (field, np.flatnonzero(a != b)[:5], a[a != b][:5], b[a != b][:5])
+
+
+@pytest.mark.parametrize("core", CORES)
+@pytest.mark.parametrize("view", CAMERAS)
+@pytest.mark.parametrize("name", BY_NAME)
+def test_camera_rays(name, view, core):
+    scene, index, brute = viewed(name, view, core)
+    size = (23, 17) if core == "fast" else (9, 7)
+    rng = np.random.default_rng(1)
+    for o, d in (pixels(scene.camera, size), pixels(scene.camera, size, rng)):
+        same(index.closest(o, d), brute.closest(o, d))
+        some = rng.permutation(len(o))[:len(o) // 2]
+        t_max = 10.0 ** rng.uniform(-2, 1, len(some)) * np.linalg.norm(np.ptp(points_of(scene), axis=0))
+        same(index.closest(o[some], d[some], 0.0, t_max), brute.closest(o[some], d[some], 0.0, t_max))
+        near = 0.3 * t_max
+        same(index.closest(o[some], d[some], near, t_max), brute.closest(o[some], d[some], near, t_max))
+        assert np.array_equal(index.occluded(o[some], d[some], near, t_max), brute.occluded(o[some], d[some], near, t_max))
+
+
+@pytest.mark.parametrize("core", CORES)
+@pytest.mark.parametrize("name", BY_NAME)
+@pytest.mark.parametrize("technique", ["image-directory"])
+def test_all_other_rays(name, core, technique):
+    scene, index, _ = viewed(name, "in front", core, technique)
+    rays = scene_of(name)[1]
+    assert_same_hits(answers(index, rays), reference(name)[0], rays, name)
+    _, ends, expected = reference(name)
+    assert_same_hits(answers(index, ends), expected, ends, name)
+    o, d, t_min, t_max = rays
+    assert np.array_equal(np.asarray(index.occluded(o, d, t_min, t_max)), reference(name)[0].primitive >= 0)
+
+
+@pytest.mark.parametrize("core", CORES)
+def test_camera_rays_are_served_and_others_handed_over(core):
+    scene = jittered_sphere(np.random.default_rng(0))
+    scene.camera = Camera.look_at((0.3, -4.0, 1.0), (0.0, 0.0, 0.0))
+    index = build(scene, "image-directory", core)
+    o, d = pixels(scene.camera, (12, 12))
+    hits = index.closest(o, d, count=True)
+    assert index._second is None, "a camera ray was handed over"
+    found = np.asarray(hits.primitive) >= 0
+    assert found.any() and np.asarray(hits.n_it)[found].mean() < 4.0
+    index.closest(o + 0.1, d)
+    assert index._second is not None
+
+
+@pytest.mark.parametrize("core", CORES)
+def test_without_a_camera_a_notice_says_so(core):
+    scene = jittered_sphere(np.random.default_rng(0))
+    index = build(scene, "image-directory", core)
+    assert any("camera" in str(n) for n in index.notices)
+    assert np.asarray(index.closest([(0, 0, 5)], [(0, 0, -1)]).primitive)[0] >= 0
+
+
+def test_ragged_pieces_of_a_picture_are_a_grid():
+    from rayscope.core.fast.directional.image_directory import pixel_grid
+    u, v = np.tile(np.linspace(-1, 1, 20), 8), np.repeat(np.linspace(-1, 1, 8), 20)
+    for a, b in ((0, 160), (7, 160), (0, 133), (17, 160), (13, 101)):
+        grid, offset = pixel_grid(u[a:b], v[a:b])
+        assert grid is not None and grid.columns == 20 and offset == a % 20, (a, b)
+        assert grid.half_u < 1e-12 and grid.half_v < 1e-12
+    rng = np.random.default_rng(0)
+    assert pixel_grid(rng.random(100), rng.random(100))[0] is None
+
+
+@pytest.mark.parametrize("size", [(40, 30)])
+def test_deep_scenes_hide_what_is_behind(size, monkeypatch):
+    """Many layers of triangles: few of them are tested."""
+    from rayscope.core.fast.directional import image_directory
+    monkeypatch.setattr(image_directory, "PAIRS", 3000)
+    monkeypatch.setattr(image_directory, "TILE", 4)
+    rng = np.random.default_rng(0)
+    x, y = np.meshgrid(np.arange(12.0), np.arange(12.0), indexing="ij")
+    corner = np.stack([x.ravel(), y.ravel()], axis=1)
+    layers = []
+    for z in -np.arange(40.0):
+        a = np.concatenate([corner, np.full((len(corner), 1), z)], axis=1)
+        layers += [np.stack([a, a + (1, 0, 0), a + (1, 1, 0)], axis=1), np.stack([a, a + (1, 1, 0), a + (0, 1, 0)], axis=1)]
+    corners = np.concatenate(layers).reshape(-1, 3) - (6.0, 6.0, 0.0)
+    scene = Scene.from_triangles(corners, np.arange(len(corners)).reshape(-1, 3))
+    scene.camera = Camera.look_at((0.1, 0.2, 3.0), (0.0, 0.0, 0.0), up=(0.0, 1.0, 0.0))
+    index, brute = build(scene, "image-directory"), build(scene, "bvh")
+    o, d = pixels(scene.camera, size)
+    hits = index.closest(o, d, count=True)
+    same(hits, brute.closest(o, d))
+    assert hits.n_it.mean() < 3.0
