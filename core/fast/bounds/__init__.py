@@ -113,6 +113,20 @@ class Volumes:
         met = np.flatnonzero(meets(t_in, t_out))
         return met, t_in.take(met), t_out.take(met)
 
+    def meet_all(self, values, t_far):
+        """Test all rays against all volumes: t_in, t_out as in :meth:`meet`, shape (rays, n).
+
+        Parameters
+        ----------
+        values : ndarray
+            Of :meth:`of_rays`, for r rays.
+        t_far : ndarray, shape (r,)
+        """
+        rows = values[:, :, None]
+        slack = rows[0] + np.minimum(rows[0] * self.columns[0], self.columns[1]) if self.loose else rows[0]
+        t_in, t_out = self.meet(self.own[:, None], rows[2:], slack, rows[1], t_far[:, None])
+        return np.broadcast_arrays(t_in, t_out)
+
     def area(self):
         """Surface areas, shape (n,)."""
         raise NotImplementedError

@@ -2,7 +2,8 @@
 
 import numpy as np
 
-from . import Volumes, maker, meets
+from . import Volumes, columns, maker, margins, meets
+from .aabb import Aabbs
 
 
 class _Combined(Volumes):
@@ -62,23 +63,28 @@ class Intersections(_Combined):
 
 
 class Unions(_Combined):
-    """Two volumes, each around one half of the primitives, or of a single primitive's box.
-
-    The halves are those of the median along the axis on which the centres spread most.
-    """
+    """Two axis-aligned boxes, around the parts of the primitives on either side of the middle of their common box."""
 
     @classmethod
     def fit(cls, primitives, item, offset, kinds):
         own = np.repeat(np.arange(len(offset)), np.diff(offset, append=len(item)))
-        centre = (primitives.lo + primitives.hi)[item]
-        spread = np.maximum.reduceat(centre, offset) - np.minimum.reduceat(centre, offset)
-        value = centre[np.arange(len(item)), spread.argmax(axis=1)[own]]
-        item = item[np.lexsort((value, own))]
-        size = np.diff(offset, append=len(item))
-        middle = offset + size // 2
-        # Of a single primitive both parts are the same.
-        first, second = (_pieces(item, a, b) for a, b in ((offset, np.maximum(middle, offset + 1)), (middle, offset + size)))
-        return cls([maker(k)(primitives, *piece) for k, piece in zip(kinds, (first, second))], kinds)
+        slack = np.maximum.reduceat(margins(primitives)[0][item], offset)
+        lo, hi = np.minimum.reduceat(primitives.lo[item], offset), np.maximum.reduceat(primitives.hi[item], offset)
+        at, axis = np.arange(len(offset)), (hi - lo).argmax(axis=1)
+        middle = 0.5 * lo[at, axis] + 0.5 * hi[at, axis]
+        low_hi, high_lo = hi.copy(), lo.copy()
+        low_hi[at, axis] = high_lo[at, axis] = middle
+        parts = []
+        for part_lo, part_hi in ((lo, low_hi), (high_lo, hi)):
+            a, b = primitives.clip(item, part_lo[own], part_hi[own])
+            empty = (a > b).any(axis=1)[:, None]
+            a, b = np.where(empty, np.inf, a), np.where(empty, -np.inf, b)
+            a, b = np.minimum.reduceat(a, offset), np.maximum.reduceat(b, offset)
+            # Nothing on one side, where rounding has decided so: the whole box is right too.
+            nothing = (a > b).any(axis=1)[:, None]
+            a, b = np.where(nothing, lo, a).T - slack, np.where(nothing, hi, b).T + slack
+            parts.append(Aabbs(columns(primitives, item, offset, [*a, *b])))
+        return cls(parts, kinds)
 
     def refitted(self, primitives, item, offset):
         return self.fit(primitives, item, offset, self.kinds)
@@ -98,10 +104,3 @@ class Unions(_Combined):
     def boxes(self):
         boxes = [p.boxes() for p in self.parts]
         return np.minimum.reduce([b[0] for b in boxes]), np.maximum.reduce([b[1] for b in boxes])
-
-
-def _pieces(item, start, end):
-    """Parts of `item`, one after the other, and where each begins."""
-    size = end - start
-    ends = np.cumsum(size)
-    return item[np.repeat(start - (ends - size), size) + np.arange(ends[-1])], ends - size

@@ -1,7 +1,7 @@
 """Combined volumes: intersections and unions of simpler ones."""
 
 from . import Margin, Volume, maker
-from .aabb import box_area
+from .aabb import Aabb, box_area
 
 
 class _Combined(Volume):
@@ -47,28 +47,28 @@ class Intersection(_Combined):
 
 
 class Union(_Combined):
-    """Two volumes, each around one half of the primitives, or both around the only one.
+    """Two axis-aligned boxes, around the parts of the primitives on either side of the middle of their common box."""
 
-    The halves are those of the median along the axis on which the centres spread most.
-    """
-
-    __slots__ = ("kinds",)
-
-    def __init__(self, parts, kinds):
-        super().__init__(parts)
-        self.kinds = kinds
+    __slots__ = ()
 
     @classmethod
     def around(cls, primitives, kinds):
-        centres = [[l + h for l, h in zip(p.lo, p.hi)] for p in primitives]
-        axis = max(range(3), key=lambda a: max(c[a] for c in centres) - min(c[a] for c in centres))
-        order = sorted(range(len(primitives)), key=lambda i: centres[i][axis])
-        some = [primitives[i] for i in order]
-        middle = len(some) // 2
-        return cls([maker(k)(half) for k, half in zip(kinds, (some[:max(middle, 1)], some[middle:]))], kinds)
+        margin = Margin.of(primitives)
+        lo = tuple(min(p.lo[axis] for p in primitives) for axis in range(3))
+        hi = tuple(max(p.hi[axis] for p in primitives) for axis in range(3))
+        axis = max(range(3), key=lambda a: hi[a] - lo[a])
+        middle = 0.5 * lo[axis] + 0.5 * hi[axis]
+        parts = []
+        for part_lo, part_hi in ((lo, hi[:axis] + (middle,) + hi[axis + 1:]), (lo[:axis] + (middle,) + lo[axis + 1:], hi)):
+            boxes = [p.clip(part_lo, part_hi) for p in primitives]
+            # Nothing on one side, where rounding has decided so: the whole box is right too.
+            boxes = [(a, b) for a, b in boxes if all(x <= y for x, y in zip(a, b))] or [(lo, hi)]
+            parts.append(Aabb(tuple(min(a[k] for a, _ in boxes) - margin.slack for k in range(3)),
+                              tuple(max(b[k] for _, b in boxes) + margin.slack for k in range(3)), margin))
+        return cls(parts)
 
     def refitted(self, primitives):
-        return Union.around(primitives, self.kinds)
+        return Union.around(primitives, None)
 
     def enter(self, ray, t_far):
         met = [m for p in self.parts if (m := p.enter(ray, t_far))]

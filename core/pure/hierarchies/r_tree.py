@@ -157,11 +157,11 @@ class RTree(Tree):
             return
         self.complete(_node(self.root))
 
-    def _take_over(self, primitives, name):
-        super()._take_over(primitives, name)
+    def refit_volumes(self):
         for item, box in self.boxes.items():
-            box.lo, box.hi = primitives[item].lo, primitives[item].hi
+            box.lo, box.hi = self.primitives[item].lo, self.primitives[item].hi
         _refit(self.root)
+        super().refit_volumes()
 
 
 def _node(box):

@@ -171,31 +171,42 @@ class Tree(Structure):
         SceneError
             When it has other primitives than before.
         """
-        moved = {}
-
-        def inner(primitives):
-            if len(moved) >= len(structures):
-                raise changed(self.technique.name)
-            structure = structures[len(moved)]
-            structure._take_over(primitives, self.technique.name)
-            moved[id(structure)] = structure
-            return structure
-
-        structures = list({id(p.inner): p.inner for p in self.primitives if p.KIND == "instance"}.values())
-        self._take_over(primitives_of(scene, inner), self.technique.name)
-        self.scene = scene
+        follow(self, scene)
         return self.figures
 
-    def _take_over(self, primitives, name):
-        """Replace the primitives by moved ones."""
-        if ([(p.KIND, p.object, p.primitive) for p in self.primitives if p.KIND != "instance"]
-                != [(p.KIND, p.object, p.primitive) for p in primitives if p.KIND != "instance"]
-                or len(self.primitives) != len(primitives)):
-            raise changed(name)
-        self.primitives = primitives
-        if primitives and self.nodes:
+    def refit_volumes(self):
+        """Fit the volumes to where the primitives are now, and measure."""
+        if self.nodes:
             self.fit(lambda node, own: self.around(node).refitted(own))
             self.measure()
+
+
+def follow(structure, scene):
+    """Refit a structure, and those inside its instances, by their ``refit_volumes``."""
+    name = structure.technique.name
+    inner = iter({id(p.inner): p.inner for p in structure.primitives if p.KIND == "instance"}.values())
+
+    def again(primitives):
+        old = next(inner, None)
+        if old is None:
+            raise changed(name)
+        _take_over(old, primitives, name)
+        return old
+
+    _take_over(structure, primitives_of(scene, again), name)
+    structure.scene = scene
+
+
+def _take_over(structure, primitives, name):
+    """Replace the primitives of a structure by moved ones."""
+    def same(p):
+        return p.KIND, p.object, getattr(p, "primitive", -1)
+
+    if list(map(same, structure.primitives)) != list(map(same, primitives)):
+        raise changed(name)
+    structure.primitives = primitives
+    if primitives:
+        structure.refit_volumes()
 
 
 def changed(name):
