@@ -128,6 +128,26 @@ def sphere(origin, direction, centre, radius):
     return (-b - root) / a, (-b + root) / a
 
 
+def squared_distance(point, a, b, c):
+    """The squared distance of a point to a triangle, which may be a line or a point; all may be Fractions."""
+    p, a, b, c = map(fractions, (point, a, b, c))
+    n = _cross(_sub(b, a), _sub(c, a))
+    size = _dot(n, n)
+    if size:
+        above = all(_dot(_cross(_sub(y, x), _sub(p, x)), n) >= 0 for x, y in ((a, b), (b, c), (c, a)))
+        if above:
+            return _dot(n, _sub(p, a)) ** 2 / size
+    return min(_squared_distance_to_edge(p, x, y) for x, y in ((a, b), (b, c), (c, a)))
+
+
+def _squared_distance_to_edge(p, a, b):
+    e, s = _sub(b, a), _sub(p, a)
+    length = _dot(e, e)
+    along = min(max(_dot(e, s) / length, 0), 1) if length else 0
+    off = [x - along * y for x, y in zip(s, e)]
+    return _dot(off, off)
+
+
 def nearest(origin, direction, corners, t_min=0.0, t_max=math.inf):
     """The nearest triangles that a ray meets.
 
