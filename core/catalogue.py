@@ -185,7 +185,7 @@ TECHNIQUES = (
               )),
     Technique("image-directory", "Image Directory", "directional", "image_directory", "ImageDirectory",
               "Weghorst, Hooper and Greenberg 1984",
-              "What primary rays can meet is listed in the image plane beforehand; other rays are handed to a bvh", rays=("primary",), cores=("fast",)),
+              "What primary rays can meet is listed in the image plane beforehand; other rays are handed to a bvh", rays=("primary",)),
     Technique("embree", "Embree", "peers", "embree", "Embree",
               "Wald et al. 2014", "Intel's ray tracing kernels, through the package embreex",
               primitives="triangle", cores=("fast",)),

@@ -12,7 +12,7 @@ from rayscope.core.scene.scene import Object, Shapes
 from .datasets import DATASETS, jittered_sphere, points_of, rays_for
 from .test_properties import BY_NAME, answers, assert_same_hits, index_of as any_index, reference, scene_of
 
-CORES = ("fast",)
+CORES = ("pure", "fast")
 CAMERAS = {
     "in front": {},
     "shifted": {"window": (0.1, 0.9, -0.7, -0.2)},
@@ -45,7 +45,7 @@ def viewed(name, view, core, technique="image-directory"):
         if BY_NAME[name].instanced:
             from rayscope.core.scene.layout import Layout
             patch.setattr(Layout, "of", functools.partial(Layout.of, copies_at_most=0))
-        return scene, build(scene, technique, core), build(scene, "brute", "fast")
+        return scene, build(scene, technique, core), build(scene, "brute", core)
 
 
 def pixels(camera, size, jitter=None):
@@ -102,6 +102,24 @@ def test_camera_rays_are_served_and_others_handed_over(core):
     assert found.any() and np.asarray(hits.n_it)[found].mean() < 4.0
     index.closest(o + 0.1, d)
     assert index._second is not None
+
+
+def test_a_cell_covered_by_one_triangle_answers_at_once():
+    """Two large triangles in front of many small ones: one test a ray, but along their common edge."""
+    rng = np.random.default_rng(0)
+    large = np.array([[(-5, -5, 0), (5, -5, 0), (5, 5, 0)], [(-5, -5, 0), (5, 5, 0), (-5, 5, 0)]], float)
+    small = rng.normal(size=(200, 1, 3)) + 0.3 * rng.normal(size=(200, 3, 3)) - (0.0, 0.0, 8.0)
+    corners = np.concatenate([large, small]).reshape(-1, 3)
+    scene = Scene.from_triangles(corners, np.arange(len(corners)).reshape(-1, 3))
+    scene.camera = Camera.look_at((0.0, 0.5, 4.0), (0.0, 0.0, 0.0), up=(0.0, 1.0, 0.0))
+    index = build(scene, "image-directory", "pure")
+    assert {c.covered for c in index.root.walk() if not c.children} >= {0, 1}
+    cells = index.cells()
+    assert len(cells) == index.figures["N_E"] + index.figures["N_G"]
+    o, d = pixels(scene.camera, (20, 20))
+    assert np.mean(index.closest(o, d, count=True).n_it) < 1.5
+    # A ray that starts behind what hides the rest meets the rest all the same.
+    same(index.closest(o, d, 6.0), build(scene, "brute", "pure").closest(o, d, 6.0))
 
 
 @pytest.mark.parametrize("core", CORES)

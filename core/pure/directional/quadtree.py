@@ -1,0 +1,92 @@
+"""The window divided adaptively: a quadtree whose cells list what can be met through them, nearest first."""
+
+import math
+
+#: A cell with more primitives is divided, ...
+LEAF_SIZE = 4
+#: ... down to this level, ...
+MAX_DEPTH = 9
+#: ... and as long as the four parts together list at most so many times as much.
+GROWTH = 3.0
+
+
+class Cell:
+    """A cell of the window.
+
+    Attributes
+    ----------
+    area : tuple
+        u_lo, u_hi, v_lo, v_hi.
+    level : int
+    children : list of 4 Cell, or None
+    entries : list of (nearness, item)
+        In descending order; `item` is met there with that nearness at most.
+    covered : int
+        The primitive that certainly covers the cell and hides what was behind it, -1 for none.
+    number : int
+        Its place in :meth:`walk`, from the root.
+    """
+
+    __slots__ = ("area", "level", "children", "entries", "covered", "number")
+
+    def __init__(self, area, level):
+        self.area, self.level = area, level
+        self.children, self.entries, self.covered, self.number = None, [], -1, 0
+
+    def leaf(self, u, v):
+        """The leaf with a point."""
+        cell = self
+        while cell.children:
+            u_lo, u_hi, v_lo, v_hi = cell.area
+            cell = cell.children[(u >= 0.5 * (u_lo + u_hi)) + 2 * (v >= 0.5 * (v_lo + v_hi))]
+        return cell
+
+    def walk(self):
+        """Yield this cell and all below, each before its children."""
+        stack = [self]
+        while stack:
+            cell = stack.pop()
+            yield cell
+            stack += cell.children or ()
+
+
+def divide(footprints, occludes=lambda footprint, low, high: True, area=(-1.0, 1.0, -1.0, 1.0), leaf_size=LEAF_SIZE, max_depth=MAX_DEPTH):
+    """Divide a window.
+
+    Parameters
+    ----------
+    footprints : list of Footprint
+    occludes : callable
+        ``occludes(footprint, low, high)``: whether a primitive that covers a cell with nearness between `low` and `high`
+        surely ends every ray there.
+
+    Returns
+    -------
+    Cell
+    """
+    root = Cell(area, 0)
+    todo = [(root, footprints)]
+    while todo:
+        cell, some = todo.pop()
+        u_lo, u_hi, v_lo, v_hi = cell.area
+        # A trifle larger, so that the cell of a point does not depend on how its coordinates were rounded.
+        grow = 2.0**-40
+        wide = (u_lo - grow, u_hi + grow, v_lo - grow, v_hi + grow)
+        there = [(f, *f.nearness(wide)) for f in some if f.reaches(wide)]
+        hidden_below = -math.inf
+        for f, low, high in there:
+            if low > hidden_below and f.covers(wide) and occludes(f, low, high):
+                hidden_below, cell.covered = low, f.item
+        there = [entry for entry in there if entry[2] >= hidden_below]
+        if len(there) > leaf_size and cell.level < max_depth:
+            u, v = 0.5 * (u_lo + u_hi), 0.5 * (v_lo + v_hi)
+            quarters = [(a, b, c, d) for c, d in ((v_lo, v), (v, v_hi)) for a, b in ((u_lo, u), (u, u_hi))]
+            kept = [f for f, _, _ in there]
+            if sum(f.reaches(q) for q in quarters for f in kept) <= GROWTH * len(kept):
+                cell.children = [Cell(q, cell.level + 1) for q in quarters]
+                todo += [(child, kept) for child in cell.children]
+                continue
+        cell.entries = sorted(((high, f.item) for f, _, high in there), reverse=True)
+    for number, cell in enumerate(root.walk()):
+        cell.number = number
+    return root
