@@ -273,6 +273,10 @@ def trace_options(sub):
     sub.add_argument("--seed", type=int, default=0)
     sub.add_argument("--threshold", type=float, default=0.0, help="rays with less weight in their pixel are not traced")
     sub.add_argument("--roulette", action="store_true", help="trace some of the rays below the threshold, by chance, for the others")
+    sub.add_argument("--antialiasing", choices=("uniform", "corners", "variance"), default="uniform",
+                     help="equally many samples in all pixels, or more where corners differ or where the variance is high")
+    sub.add_argument("--aa-threshold", type=float, default=0.03, help="difference in displayed values, 0 to 1, that is put up with")
+    sub.add_argument("--aa-level", type=int, default=2, help="adaptive antialiasing: 4^level samples a pixel, at most")
     sub.add_argument("--count", action="store_true", help="count tests and steps (slower)")
     sub.add_argument("--image", metavar="OUT.png", help="write the picture")
     sub.add_argument("--figures", metavar="OUT.json", help="write what it cost")
@@ -288,6 +292,7 @@ def trace_verb(call):
     others = {kind: checked(choice, call.core) for kind in ("primary", "secondary", "shadow") if (choice := getattr(call, kind))}
     check_output("--image", call.image)
     check_output("--figures", call.figures)
+    fewer = {name: getattr(call, name) for name in ("threshold", "roulette", "antialiasing", "aa_threshold", "aa_level")}
     scene = call.scene(call.size)
     size = call.size or proportional(scene.camera)
     expected = estimate(scene, name, call.core, size, max(call.samples, 1), max(call.depth, 0)).check_memory()
@@ -295,11 +300,11 @@ def trace_verb(call):
         say(expected.lines()[0])
     with stoppable() as progress:
         result = trace(scene, name, call.core, size, call.depth, call.samples, call.seed, parameters=parameters, count=call.count,
-                       progress=progress, threshold=call.threshold, roulette=call.roulette, **others)
+                       progress=progress, **fewer, **others)
     for notice in result.notices:
         say(str(notice))
     asked = {"technique": name, "parameters": parameters, **others, "core": call.core, "size": size, "depth": call.depth,
-             "samples": call.samples, "threshold": call.threshold, "roulette": call.roulette}
+             "samples": call.samples, **fewer}
     record = report.record("trace", scene, call.seed, asked, figures=result.figures, stopped=result.cancelled)
     rows = [{"rays": kind, **{key: row.get(key) for key in ("technique", "hits", "saved", "N_IT", "N_TS", "N_ETS", "N_EETS", "r_ITM")}, "n": row["rays"]}
             for kind, row in result.figures.items() if isinstance(row, dict) and row["rays"]]
@@ -438,6 +443,49 @@ def stability_verb(call):
     return Outcome("\n".join(text), record, FAILED if result["failed"] else DONE)
 
 
+# --- bounds, motion ---------------------------------------------------------------------------------------------------
+
+def bounds_options(sub):
+    sub.add_argument("--around", choices=("object", "primitive"), default="object", help="one volume around each object, or around each primitive")
+    sub.add_argument("--levels", action="store_true", help="also, level by level of the trees, how probably a ray hits a node: predicted and measured")
+    sub.add_argument("--rays", metavar="N", type=whole(1, 1_000_000), default=2000, help="primary rays, and as many bounces")
+    sub.add_argument("--seed", type=whole(0, 2**31 - 1), default=0)
+
+
+def bounds_verb(call):
+    """What bounding volumes are worth."""
+    from .lab import bounds
+
+    scene = call.scene()
+    result = bounds.bounds(scene, call.around, n_rays=call.rays, seed=call.seed, say=say)
+    if call.levels:
+        result["levels"] = bounds.all_levels(scene, call.rays, call.seed, say=say)
+    for line in result["left_out"]:
+        say(f"left out: {line}")
+    record = report.record("bounds", scene, call.seed, {"around": call.around, "rays": call.rays}, meanings=bounds.MEANINGS, **result)
+    return Outcome(bounds.text(result), record)
+
+
+def motion_options(sub):
+    sub.add_argument("--frames", metavar="N", type=whole(1, 10_000), default=10)
+    sub.add_argument("--shuffles", metavar="N", type=whole(0, 1000), default=20, help="random orders of insertion for the incremental builder; 0: leave that out")
+    sub.add_argument("--rays", metavar="N", type=whole(1, 1_000_000), default=2000)
+    sub.add_argument("--seed", type=whole(0, 2**31 - 1), default=0)
+
+
+def motion_verb(call):
+    """Trees that follow motion."""
+    from .lab import motion
+
+    scene = call.scene()
+    result = {"rows": motion.motion(scene, call.frames, call.rays, call.seed, say=say)}
+    if call.shuffles:
+        say("orders of insertion")
+        result["spread"] = motion.spread(scene, call.shuffles, call.rays, call.seed)
+    record = report.record("motion", scene, call.seed, {"frames": call.frames, "shuffles": call.shuffles, "rays": call.rays}, meanings=motion.MEANINGS, **result)
+    return Outcome(motion.text(result), record)
+
+
 @dataclass(frozen=True)
 class Verb:
     """One verb.
@@ -463,6 +511,8 @@ VERBS = {
     "list": Verb("list all techniques with their parameters", list_verb, scene=False),
     "trace": Verb("trace a picture", trace_verb, trace_options),
     "compare": Verb("run techniques on the same rays; table, CSV, JSON, plots", compare_verb, compare_options),
+    "bounds": Verb("what bounding volumes are worth, object by object", bounds_verb, bounds_options),
+    "motion": Verb("refit trees after motion, against new ones; what the order of insertion does", motion_verb, motion_options),
     "bench": Verb("measure against mathutils' BVHTree and Embree", bench_verb, bench_options, scene=False),
     "stability": Verb("run techniques on stiff and extreme cases against exact arithmetic", stability_verb, stability_options, scene=False),
 }

@@ -29,7 +29,23 @@ PARAMETERS = (
     Parameter(
         "threshold", 0.0, "Rays with less weight in their pixel are not traced (adaptive depth)", low=0.0, high=1.0
     ),
-    Parameter("roulette", False, "Trace some of the rays below the threshold, by chance, for those that are not traced"),
+    Parameter("roulette", False, "Trace some of the rays below the threshold, by chance, for the others"),
+    Parameter(
+        "antialiasing",
+        "uniform",
+        "Samples: equally many in all pixels; at the corners of pixels, divided where these differ (Whitted); "
+        "more where their variance is high",
+        choices=("uniform", "corners", "variance"),
+    ),
+    Parameter(
+        "aa_threshold",
+        0.03,
+        "Adaptive antialiasing: differences in displayed values, 0 to 1, that are put up with: between corners; "
+        "as standard error of a pixel",
+        low=0.0,
+        high=1.0,
+    ),
+    Parameter("aa_level", 2, "Adaptive antialiasing: 4^level samples a pixel, at most", low=1, high=8),
 )
 
 #: Pass -> (values a pixel, type, value where nothing was met). Blender's float passes have single precision.
@@ -109,6 +125,9 @@ def trace(
     parameters=None,
     threshold=0.0,
     roulette=False,
+    antialiasing="uniform",
+    aa_threshold=0.03,
+    aa_level=2,
 ):
     """Trace a picture as Whitted (1980) did.
 
@@ -151,6 +170,15 @@ def trace(
     roulette : bool
         Such a ray is traced with the probability weight / threshold, and then weighs `threshold`: the mean over many
         samples is right, at the price of noise.
+    antialiasing : {"uniform", "corners", "variance"}
+        Where samples are taken: `samples` in each pixel; at the pixels' corners, and where these differ in colour,
+        object or depth, at those of their quarters and so on (Whitted 1980); `samples`, but at least 4, in each pixel,
+        and more where their variance is high. Both adaptive ways sample lights that have an extent.
+    aa_threshold : float
+        Difference in displayed values, 0 to 1, that is put up with: between the corners; as the standard error of a
+        pixel.
+    aa_level : int
+        4**aa_level samples a pixel, at most; corners are divided `aa_level` times.
 
     Returns
     -------
@@ -186,6 +214,9 @@ def trace(
         parameters,
         threshold,
         roulette,
+        antialiasing,
+        aa_threshold,
+        aa_level,
     )
     for tile in rendering.tiles():
         if on_tile:
@@ -223,10 +254,14 @@ class Rendering:
         parameters=None,
         threshold=0.0,
         roulette=False,
+        antialiasing="uniform",
+        aa_threshold=0.03,
+        aa_level=2,
     ):
         if core not in CORES:
             raise ParameterError(f"trace: there is no core {core!r}. Cores: {', '.join(CORES)}.")
         given = {"depth": depth, "samples": samples, "seed": seed, "threshold": threshold, "roulette": roulette}
+        given |= {"antialiasing": antialiasing, "aa_threshold": aa_threshold, "aa_level": aa_level}
         values = resolve("trace", PARAMETERS, given, core)
         self.scene, self.core, self.count = scene, core, bool(count)
         self.samples = values["samples"]
@@ -255,13 +290,17 @@ class Rendering:
             self.result.structures,
             self.size,
             values["depth"],
-            self.samples,
+            self.samples if antialiasing == "uniform" else 4 ** values["aa_level"],
             values["seed"],
             self.count,
             self._check,
             values["threshold"],
             values["roulette"],
         )
+        self._adaptive = None
+        if antialiasing != "uniform":
+            way = import_module(f".{core}.tracing.adaptive", __package__).WAYS[antialiasing]
+            self._adaptive = way(self._tracer, self.region, values["aa_threshold"], values["aa_level"], self.samples)
 
     def _wanted(self, technique, parameters, primary, shadow, secondary, index, depth):
         """Kind of ray -> (technique, its parameters), or None for `index`; only the kinds that the scene needs."""
@@ -330,22 +369,39 @@ class Rendering:
         """
         began = time.perf_counter()
         order = _tiles(self.region, self._tracer.tile_side)
-        x0, y0, x1, y1 = self.region
-        total, done = (x1 - x0) * (y1 - y0) * self.samples, 0
+        self._fraction, done = BUILDING, False
         try:
-            for sample in range(self.samples):
-                for tile in order:
-                    self._fraction = BUILDING + (1.0 - BUILDING) * done / total
-                    self._check()
-                    self._keep(tile, sample, self._tracer.tile(*tile, sample))
-                    done += (tile[2] - tile[0]) * (tile[3] - tile[1])
-                    self._figures(began)
-                    yield tile
+            self._check()
+            for fraction, tile in self._refined(order) if self._adaptive else self._sampled(order):
+                self._fraction = BUILDING + (1.0 - BUILDING) * fraction
+                self._figures(began)
+                yield tile
+                self._check()
+            done = True
             if self._progress:
                 self._progress(1.0)
         except Cancelled:
-            self.result.cancelled = done < total
+            self.result.cancelled = not done
             self._figures(began)
+
+    def _sampled(self, order):
+        """Take as many samples everywhere; yield how much is done, and the tile."""
+        x0, y0, x1, y1 = self.region
+        total, done = (x1 - x0) * (y1 - y0) * self.samples, 0
+        for sample in range(self.samples):
+            for tile in order:
+                self._keep(tile, sample, self._tracer.tile(*tile, sample))
+                done += (tile[2] - tile[0]) * (tile[3] - tile[1])
+                yield done / total, tile
+
+    def _refined(self, order):
+        """Take samples where they are needed; yield how much is done, and the tile."""
+        for fraction, tile, values, (pixels, spent) in self._adaptive.parts(order):
+            self._keep(tile, 0, values)
+            for name, cost in spent.items():
+                target = self.result.passes[name].reshape(-1)
+                np.add.at(target, pixels, np.asarray(cost, target.dtype))
+            yield fraction, tile
 
     def _keep(self, tile, sample, values):
         """Put a tile into the framebuffer."""

@@ -28,9 +28,9 @@ def mix(x):
 
 
 def first_key(pixel, sample, seed):
-    """Keys of primary rays; `pixel` is an array of y * width + x, row 0 at the bottom."""
+    """Keys of primary rays; `pixel` is an array of y * width + x, row 0 at the bottom; `sample` one or one each."""
     key = mix(np.asarray([seed & MASK], np.uint64))
-    return mix(mix(key + np.asarray(pixel).astype(np.uint64)) + np.uint64(sample))
+    return mix(mix(key + np.asarray(pixel).astype(np.uint64)) + np.asarray(sample).astype(np.uint64))
 
 
 def branch(key, which):

@@ -137,10 +137,20 @@ class Whitted:
             and ``n_ts`` where counted; for sample 0 also ``depth``, ``normal``, ``position``, ``object_index`` and
             ``primitive_index``.
         """
-        pixels = (np.arange(y0, y1)[:, None] * self.size[0] + np.arange(x0, x1)).ravel()
-        n = len(pixels)
+        return self.sampled((np.arange(y0, y1)[:, None] * self.size[0] + np.arange(x0, x1)).ravel(), sample)
+
+    def sampled(self, pixels, sample):
+        """Samples of pixels y * width + x, which may occur more than once, and what :meth:`tile` returns of them.
+
+        `sample` is the number of the sample, for all or one each.
+        """
         key = sampling.first_key(pixels, sample, self.seed) if self.samples > 1 or self.roulette else None
         o, d = primary(self.scene.camera, self.size, pixels, key if self.samples > 1 else None)
+        return self.traced(o, d, key, not np.any(sample))
+
+    def traced(self, o, d, key, first):
+        """What primary rays see; `first`: with the passes of what they meet."""
+        n = o.shape[1]
         self.radiance = np.zeros((3, n))
         self.per_pixel = {
             name: np.zeros(n, np.int64) for name in ("rays_per_pixel", *(("n_it", "n_ts") if self.count else ()))
@@ -166,7 +176,7 @@ class Whitted:
             met = np.flatnonzero(hits.primitive >= 0)
             surface = self.surfaces.at(hits, met, wave.d[:, met])
             if not out:
-                out = {} if sample else self._first(hits, met, surface)
+                out = self._first(hits, met, surface) if first else {}
                 out["combined"] = None
             self._shade(wave, hits, met, surface)
             stack += self._onward(wave, hits, met, surface)

@@ -21,11 +21,16 @@ def primary(camera, size, x, y, key):
     origin, direction : tuple of 3 float
         The direction has length 1 along the viewing axis.
     """
+    dx, dy = (0.5, 0.5) if key is None else (number(key, PIXEL), number(key, PIXEL + 1))
+    return through(camera, size, x + dx, y + dy)
+
+
+def through(camera, size, x, y):
+    """The ray through a point of the picture, in pixels from its left and its bottom edge; see :func:`primary`."""
     left, right_, bottom, top = camera.window
     position, right, up, forward = (tuple(v.tolist()) for v in camera.frame())
-    dx, dy = (0.5, 0.5) if key is None else (number(key, PIXEL), number(key, PIXEL + 1))
-    u = left + (x + dx) / size[0] * (right_ - left)
-    v = bottom + (y + dy) / size[1] * (top - bottom)
+    u = left + x / size[0] * (right_ - left)
+    v = bottom + y / size[1] * (top - bottom)
     across = add(times(u, right), times(v, up))
     if camera.kind == "perspective":
         return position, add(across, forward)

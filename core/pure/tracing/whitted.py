@@ -135,6 +135,10 @@ class Whitted:
         random = self.samples > 1
         key = sampling.first_key(y * self.size[0] + x, sample, self.seed) if random or self.roulette else None
         o, d = primary(self.scene.camera, self.size, x, y, key if random else None)
+        return self.traced(o, d, key, not sample)
+
+    def traced(self, o, d, key, with_first):
+        """What a primary ray sees; `with_first`: with the passes of what it meets."""
         self.spent = dict.fromkeys(("rays_per_pixel", *(("n_it", "n_ts") if self.count else ())), 0)
         camera = self.scene.camera
         radiance, first = (0.0, 0.0, 0.0), None
@@ -152,7 +156,7 @@ class Whitted:
             seen = self._seen(surface, path.d, path.key if self.soft else None)
             radiance = add(radiance, mul(path.weight, times(surface.alpha, seen)))
             stack += self._onward(path, hit, surface)
-        return {"combined": radiance, **self.spent, **({} if sample else self._first(*first))}
+        return {"combined": radiance, **self.spent, **(self._first(*first) if with_first else {})}
 
     def _closest(self, kind, o, d, t_min, t_max):
         """The nearest hit, counted."""

@@ -1,0 +1,217 @@
+"""Adaptive antialiasing: more samples where the picture needs them. A sample once taken is used to the end.
+
+What is judged are displayed values: 0 to 1, brighter than white is white, with a gamma of 2 (see `shown`).
+"""
+
+import math
+
+from . import sampling
+from .camera import through
+from .vectors import add, mul, times
+
+#: Corners whose depths differ by more than this ratio belong to different surfaces.
+DEPTHS = 1.1
+#: Samples of a pixel before its variance is judged, at least.
+FIRST = 4
+#: Passes that are sums over all rays of a pixel.
+SPENT = ("rays_per_pixel", "n_it", "n_ts")
+
+
+def shown(radiance):
+    """Displayed value of a linear one."""
+    return math.sqrt(min(max(radiance, 0.0), 1.0))
+
+
+class Adaptive:
+    """Base of the two ways.
+
+    Parameters
+    ----------
+    tracer : Whitted
+    region : (int, int, int, int)
+        x0, y0, x1, y1.
+    threshold : float
+        Difference of displayed values that is put up with.
+    level : int
+        How fine: 4**level samples a pixel, at most.
+    samples : int
+        Samples a pixel to begin with, where that can be chosen.
+    """
+
+    def __init__(self, tracer, region, threshold, level, samples):
+        self.tracer, self.region, self.threshold, self.level, self.samples = tracer, region, threshold, level, samples
+        self._forget()
+
+    def parts(self, order):
+        """Trace.
+
+        Parameters
+        ----------
+        order : list of (int, int, int, int)
+            The tiles of the region.
+
+        Yields
+        ------
+        fraction : float
+            How much is done.
+        tile : (int, int, int, int)
+            What is better now.
+        values : dict
+            Pass -> values of the tile's pixels, as from :meth:`Whitted.tile`.
+        spent : (list, dict)
+            Pixels, y * width + x, also more than once; pass -> what rays of those pixels have cost.
+        """
+        raise NotImplementedError
+
+    def _forget(self):
+        """Nothing is spent since."""
+        self.pixels, self.costs = [], {}
+
+    def _spend(self, x, y, values):
+        """Take what was spent on a pixel out of what the tracer returned."""
+        self.pixels.append(y * self.tracer.size[0] + x)
+        for name in SPENT:
+            if name in values:
+                self.costs.setdefault(name, []).append(values.pop(name))
+        return values
+
+    def _spent(self):
+        """What was spent since this was asked for."""
+        spent = self.pixels, self.costs
+        self._forget()
+        return spent
+
+
+class Corners(Adaptive):
+    """Whitted's (1980): a pixel's corners are traced; where they differ it is divided into four squares, and so on.
+
+    A square's colour is the mean of its corners'. Pixels are divided when their corners differ in displayed colour, in
+    the object seen or in depth; the squares inside, when they differ in colour. Neighbours share their corners.
+    """
+
+    def __init__(self, tracer, region, threshold, level, samples):
+        super().__init__(tracer, region, threshold, level, samples)
+        #: Points lie on a lattice with 2**level steps a pixel.
+        self.side = 1 << level
+        #: Point -> (radiance, object, depth).
+        self.known = {}
+
+    def parts(self, order):
+        """See :class:`Adaptive`."""
+        for i, tile in enumerate(order):
+            yield (i + 1) / (2 * len(order)), tile, self._first(*tile), self._spent()
+        for i, (x0, y0, x1, y1) in enumerate(order):
+            corners = [(x * self.side, y * self.side) for y in range(y0, y1) for x in range(x0, x1)]
+            pixels = [self._square(*corner, self.side) for corner in corners]
+            yield 0.5 + (i + 1) / (2 * len(order)), order[i], {"combined": pixels}, self._spent()
+
+    def _first(self, x0, y0, x1, y1):
+        """The lower left corners of a tile's pixels."""
+        out = {}
+        for y in range(y0, y1):
+            for x in range(x0, x1):
+                for name, value in self._traced(x * self.side, y * self.side).items():
+                    out.setdefault(name, []).append(value)
+        return out
+
+    def _traced(self, ix, iy):
+        """Trace a point of the lattice; all that the tracer returns."""
+        tracer = self.tracer
+        o, d = through(tracer.scene.camera, tracer.size, ix / self.side, iy / self.side)
+        key = sampling.first_key(iy * (tracer.size[0] * self.side + 1) + ix, 0, tracer.seed)
+        values = tracer.traced(o, d, key, True)
+        self._spend(min(ix // self.side, self.region[2] - 1), min(iy // self.side, self.region[3] - 1), values)
+        self.known[ix, iy] = values["combined"], values["object_index"], values["depth"]
+        return values
+
+    def _square(self, ix, iy, step):
+        """Radiance of a square of the lattice."""
+        corners = []
+        for point in ((ix, iy), (ix + step, iy), (ix, iy + step), (ix + step, iy + step)):
+            if point not in self.known:
+                self._traced(*point)
+            corners.append(self.known[point])
+        total = (0.0, 0.0, 0.0)
+        if step > 1 and self._differ(corners, step == self.side):
+            step //= 2
+            for x, y in ((ix, iy), (ix + step, iy), (ix, iy + step), (ix + step, iy + step)):
+                total = add(total, self._square(x, y, step))
+        else:
+            for radiance, *_ in corners:
+                total = add(total, radiance)
+        return times(0.25, total)
+
+    def _differ(self, corners, whole_pixel):
+        """Whether the corners of a square differ."""
+        colours, things, depths = zip(*corners)
+        for channel in zip(*colours):
+            values = [shown(v) for v in channel]
+            if max(values) - min(values) > self.threshold:
+                return True
+        return whole_pixel and (len(set(things)) > 1 or max(depths) > DEPTHS * min(depths))
+
+
+class Variance(Adaptive):
+    """Pixels get more samples until the standard error of their mean, as displayed, is below the threshold.
+
+    The samples are those of uniform sampling. A pixel's variance is the mean of that of the 3 x 3 pixels around it:
+    few samples of its own may all miss an edge, and to stop where they happen to agree would make a bias.
+    """
+
+    def parts(self, order):
+        """See :class:`Adaptive`."""
+        x0, y0, x1, y1 = self.region
+        most = 4**self.level
+        begin = min(max(self.samples, FIRST), most)
+        everywhere = [(x, y) for y in range(y0, y1) for x in range(x0, x1)]
+        #: Pixel -> number of samples, their sum, the sum of their squares.
+        self.state = {pixel: (0, (0.0,) * 3, (0.0,) * 3) for pixel in everywhere}
+        rounds = 1 + math.ceil(math.log2(most / begin))
+        for turn in range(rounds):
+            if turn == 0:
+                more = dict.fromkeys(everywhere, begin)
+            else:
+                variances = {pixel: self._variance(pixel) for pixel in everywhere}
+                noisy = [pixel for pixel in everywhere if self._noisy(pixel, variances)]
+                more = {pixel: min(self.state[pixel][0], most - self.state[pixel][0]) for pixel in noisy}
+            for i, tile in enumerate(order):
+                out, combined, worked = {}, [], False
+                for y in range(tile[1], tile[3]):
+                    for x in range(tile[0], tile[2]):
+                        for _ in range(more.get((x, y), 0)):
+                            worked = True
+                            for name, value in self._sampled(x, y).items():
+                                out.setdefault(name, []).append(value)
+                        n, total, _ = self.state[x, y]
+                        combined.append(times(1.0 / n, total))
+                if worked:
+                    yield (turn + (i + 1) / len(order)) / rounds, tile, {**out, "combined": combined}, self._spent()
+
+    def _sampled(self, x, y):
+        """Take a pixel's next sample; the passes that the first one gives."""
+        n, total, squares = self.state[x, y]
+        values = self._spend(x, y, self.tracer.pixel(x, y, n))
+        radiance = values.pop("combined")
+        self.state[x, y] = n + 1, add(total, radiance), add(squares, mul(radiance, radiance))
+        return values
+
+    def _variance(self, pixel):
+        """Of a pixel's samples."""
+        n, total, squares = self.state[pixel]
+        return tuple(max(s / n - (t / n) ** 2, 0.0) * (n / (n - 1)) for s, t in zip(squares, total))
+
+    def _noisy(self, pixel, variances):
+        """Whether the standard error is above the threshold."""
+        x, y = pixel
+        near = [variances[p] for dy in (-1, 0, 1) for dx in (-1, 0, 1) if (p := (x + dx, y + dy)) in variances]
+        n, total, _ = self.state[pixel]
+        for channel in range(3):
+            mean = total[channel] / n
+            error = math.sqrt(sum(v[channel] for v in near) / len(near) / n)
+            # Either way: a pixel that is all white so far can only become darker.
+            if max(shown(mean + error) - shown(mean), shown(mean) - shown(mean - error)) > self.threshold:
+                return True
+        return False
+
+
+WAYS = {"corners": Corners, "variance": Variance}

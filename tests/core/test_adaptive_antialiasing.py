@@ -1,0 +1,206 @@
+"""Adaptive antialiasing: where samples go, that none is lost, and that it costs less than it saves."""
+
+import functools
+import math
+
+import numpy as np
+import pytest
+
+from rayscope.core import Camera, Cancelled, Light, Material, Mesh, Object, ParameterError, Scene, World, solids, trace
+from rayscope.core.rendering import Rendering
+
+CORES = pytest.mark.parametrize("core", ["fast", "pure"])
+WAYS = pytest.mark.parametrize("way", ["corners", "variance"])
+
+
+def half(slope=0.0, colour=(1, 1, 1)):
+    """A glowing half plane x < slope * y before black, the camera's picture being [0, 1] x [0, 1]."""
+    corners = np.array([(-9, -9, 0), (-9 * slope, -9, 0), (9 * slope, 9, 0), (-9, 9, 0)], float)
+    glow = Material("glow", diffuse=0, ambient=0, emission=colour)
+    camera = Camera(np.eye(4), (-0.5, 0.5, -0.5, 0.5), "orthographic")
+    camera.matrix[2, 3] = 5
+    return Scene([Object("half", Mesh(corners, [(0, 1, 2), (0, 2, 3)]), materials=(glow,))], camera=camera, world=World((0, 0, 0)))
+
+
+def lit():
+    """A ball, its soft shadow, a mirror: something to do for both ways."""
+    return Scene(
+        [
+            Object("floor", Mesh(np.array([(-9, -9, 0), (9, -9, 0), (0, 15, 0)], float), [(0, 1, 2)])),
+            Object("mirror", Mesh(np.array([(-2, 2, 0), (3, 2, 0), (0, 3, 4)], float), [(0, 1, 2)]), materials=(Material("m", mirror=0.7),)),
+        ],
+        [Light("lamp", "point", (50, 50, 50), (3, -3, 4), radius=0.4)],
+        Camera.look_at((0, -6, 3), (0, 0, 0.6), angle=math.radians(40), aspect=4 / 3),
+        World((0.2, 0.3, 0.5)),
+        solids=[solids.sphere((0, 0, 0.7), 0.7)],
+    )
+
+
+@functools.cache
+def reference(size):
+    """Of the lit scene."""
+    return trace(lit(), size=size, samples=256, seed=50).image
+
+
+@WAYS
+@pytest.mark.parametrize("region", [None, (1, 2, 13, 9)])
+def test_both_cores_take_the_same_samples(way, region):
+    fast, pure = (
+        trace(lit(), "brute", core, (18, 10), 2, seed=5, region=region, antialiasing=way, count=True) for core in ("fast", "pure")
+    )
+    assert fast.passes.keys() == pure.passes.keys()
+    for name in fast.passes:
+        np.testing.assert_allclose(fast.passes[name], pure.passes[name], rtol=1e-5, atol=1e-5, err_msg=name)
+    for kind in ("primary", "reflected", "shadow"):
+        assert fast.figures[kind] == pure.figures[kind]
+        assert fast.figures[kind]["rays"] > 0
+    x0, y0, x1, y1 = region or (0, 0, 18, 10)
+    rays = fast.passes["rays_per_pixel"]
+    assert rays[y0:y1, x0:x1].min() >= 1 and rays.sum() == rays[y0:y1, x0:x1].sum()
+    assert rays.sum() == sum(f["rays"] for f in fast.figures.values() if isinstance(f, dict))
+    assert (fast.image[y0:y1, x0:x1, 3] == 1).all() and fast.image[..., 3].sum() == (x1 - x0) * (y1 - y0)
+
+
+@CORES
+def test_a_picture_of_one_colour_needs_its_corners_only(core):
+    scene = half()
+    scene.camera.window = (-2, -1, -0.5, 0.5)
+    result = trace(scene, "brute", core, (8, 6), antialiasing="corners")
+    assert result.figures["primary"]["rays"] == 9 * 7
+    np.testing.assert_array_equal(result.image, 1)
+    result = trace(scene, "brute", core, (8, 6), antialiasing="variance")
+    assert result.figures["primary"]["rays"] == 4 * 8 * 6
+    np.testing.assert_array_equal(result.image, 1)
+
+
+@CORES
+def test_corners_by_hand(core):
+    """Two pixels; the edge at 0.35 of the left one: its corners differ, and at each level those of two squares a row do."""
+    scene = half()
+    scene.camera.window = (-0.35, 1.65, 0, 1)
+    result = trace(scene, "brute", core, (2, 1), antialiasing="corners", aa_level=2)
+    # Lattice columns at 0, 1/4, 1/2, .. of the left pixel: those at 0, 1/4 are white. Squares 0-1/4 are white, 1/4-1/2 half.
+    np.testing.assert_allclose(result.image[0, :, 0], [0.25 + 0.125, 0.0], atol=1e-7)
+    # 6 corners; 5 points at 1/2; then on the left half two squares with 5 points each, of which 1 is shared.
+    assert result.figures["primary"]["rays"] == 6 + 5 + 5 + 4
+    # A point between two pixels belongs to the right one: so do 4 corners and the point in the middle of the line.
+    np.testing.assert_array_equal(result.passes["rays_per_pixel"], [[2 + 4 + 9, 4 + 1]])
+
+
+@CORES
+def test_seams_between_tiles_are_traced_once(core):
+    """An edge along the border between tiles: neighbours share the points on it."""
+    side = {"fast": 256, "pure": 16}[core]
+    scene, width = half(0.002), side + 4
+    scene.camera.window = (-side / width, 4 / width, 0, 3 / width)
+    result = trace(scene, "brute", core, (width, 3), antialiasing="corners", aa_level=3)
+    scene.camera.window = (-4 / width, 4 / width, 0, 3 / width)
+    part = trace(scene, "brute", core, (8, 3), antialiasing="corners", aa_level=3)
+    np.testing.assert_allclose(result.image[:, -8:], part.image, atol=1e-6)
+    assert result.figures["primary"]["rays"] == part.figures["primary"]["rays"] + (width - 8) * 4
+
+
+@CORES
+def test_object_and_depth_divide_pixels_whose_corners_look_alike(core):
+    scene = half()
+    alike = trace(scene, "brute", core, (6, 6), antialiasing="corners").figures["primary"]["rays"]
+    scene.world = World((1, 1, 1))  # the same colour beside it: there is an object, and there is none
+    by_object = trace(scene, "brute", core, (6, 6), antialiasing="corners").figures["primary"]["rays"]
+    assert 49 < by_object < alike
+
+
+@CORES
+def test_variance_without_a_threshold_is_uniform_sampling(core):
+    adaptive = trace(lit(), "brute", core, (6, 5), 2, seed=2, antialiasing="variance", aa_threshold=0.0, aa_level=2)
+    uniform = trace(lit(), "brute", core, (6, 5), 2, seed=2, samples=16)
+    rays = adaptive.passes["rays_per_pixel"]
+    full = rays == uniform.passes["rays_per_pixel"]
+    assert full.mean() > 0.6  # elsewhere nothing varies
+    np.testing.assert_allclose(adaptive.image[full], uniform.image[full], atol=2e-6)
+    for name in ("depth", "object_index"):
+        np.testing.assert_array_equal(adaptive.passes[name], uniform.passes[name])
+
+
+@WAYS
+def test_samples_go_where_the_edge_is(way):
+    result = trace(half(0.3), size=(32, 32), antialiasing=way, aa_level=3)
+    rays = result.passes["rays_per_pixel"]
+    y, x = np.mgrid[:32, :32]
+    distance = np.abs((x + 0.5) / 32 - 0.5 - 0.3 * ((y + 0.5) / 32 - 0.5)) * 32
+    assert rays[distance > 2.5].max() <= 4
+    assert rays[distance < 0.4].min() >= 12
+
+
+@WAYS
+def test_a_pixel_is_its_covered_area(way):
+    """The half plane's coverage, known exactly, to what the finest level resolves."""
+    slope, n = 0.3, 24
+    result = trace(half(slope), size=(n, n), antialiasing=way, aa_threshold=0.01, aa_level=4)
+    fine = 64
+    offset = (np.arange(n * fine) + 0.5) / (n * fine) - 0.5
+    exact = (offset[None, :] < slope * offset[:, None]).reshape(n, fine, n, fine).mean(axis=(1, 3))
+    error = np.abs(result.image[..., 0] - exact)
+    assert error.max() < {"corners": 0.04, "variance": 0.15}[way]
+    assert math.sqrt(np.mean(error**2)) < {"corners": 0.004, "variance": 0.008}[way]
+
+
+@WAYS
+def test_finer_thresholds_cost_more_and_err_less(way):
+    scene, size = lit(), (32, 24)
+    rays, errors = [], []
+    for threshold in (0.3, 0.1, 0.02):
+        result = trace(scene, size=size, seed=1, antialiasing=way, aa_threshold=threshold, aa_level=3)
+        rays.append(result.figures["primary"]["rays"])
+        errors.append(math.sqrt(np.mean((result.image - reference(size)) ** 2)))
+    assert rays == sorted(rays) and rays[0] < 0.7 * rays[2]
+    assert errors == sorted(errors, reverse=True) and errors[2] < 0.7 * errors[0]
+
+
+def test_fewer_rays_than_16_uniform_samples_for_the_same_error():
+    """Half as many at the corners, as was asked for; two thirds with random samples."""
+    scene, size = lit(), (48, 36)
+
+    def measured(**how):
+        result = trace(scene, size=size, seed=3, **how)
+        rays = sum(f["rays"] for f in result.figures.values() if isinstance(f, dict))
+        return math.sqrt(np.mean((result.image - reference(size)) ** 2)), rays
+
+    uniform = measured(samples=16)
+    for way, threshold, share in (("corners", 0.05, 1 / 2), ("variance", 0.0125, 2 / 3)):
+        error, rays = measured(antialiasing=way, aa_threshold=threshold, aa_level=3)
+        assert error <= uniform[0], way
+        assert rays <= share * uniform[1], way
+
+
+@CORES
+@WAYS
+def test_stopping_keeps_what_is_done(core, way):
+    calls = []
+
+    def progress(fraction):
+        calls.append(fraction)
+        if fraction > 0.3:
+            raise Cancelled("enough")
+
+    result = trace(lit(), "brute", core, (40, 30), 2, antialiasing=way, progress=progress)
+    assert result.cancelled and calls == sorted(calls)
+    done = result.image[..., 3] == 1
+    assert done.any() and (result.image[done][:, :3] > 0).any()
+
+
+@WAYS
+def test_tiles_tell_what_has_become_better(way):
+    rendering = Rendering(lit(), size=(300, 20), antialiasing=way)
+    seen = np.zeros((20, 300), int)
+    for x0, y0, x1, y1 in rendering.tiles():
+        assert (rendering.result.image[y0:y1, x0:x1, 3] == 1).all()
+        seen[y0:y1, x0:x1] += 1
+    assert seen.min() >= 1 and seen.max() >= 2
+
+
+@pytest.mark.parametrize(
+    "bad", [{"antialiasing": "none"}, {"aa_level": 0}, {"aa_level": 1.5}, {"aa_threshold": -1}, {"aa_threshold": math.nan}]
+)
+def test_impossible_values(bad):
+    with pytest.raises(ParameterError, match=next(iter(bad))):
+        trace(half(), size=(2, 2), **{"antialiasing": "corners", **bad})
