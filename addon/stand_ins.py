@@ -10,7 +10,7 @@ import numpy as np
 
 from ..core.scene.solids import BOX_CORNERS, PYRAMID_CORNERS
 
-#: Marks a mesh made here, which may be made anew when its object's kind changes.
+#: Marks a mesh made here with what it stands in for; it is made anew when its object's kind changes.
 MARK = "rayscope_stand_in"
 SEGMENTS = 32
 
@@ -71,8 +71,12 @@ def fill(mesh, kind, capped=True, ratio=0.0, segments=SEGMENTS):
     mesh.from_pydata(vertices, [], faces)
     mesh.polygons.foreach_set("use_smooth", smooth)
     mesh.update()
-    mesh[MARK] = True
+    mesh[MARK] = _signature(kind, capped, ratio)
     return mesh
+
+
+def _signature(kind, capped, ratio):
+    return f"{kind} {bool(capped)} {ratio:.6g}"
 
 
 def stand_in(kind, capped=True, ratio=0.0, segments=SEGMENTS):
@@ -83,7 +87,9 @@ def stand_in(kind, capped=True, ratio=0.0, segments=SEGMENTS):
 def refresh(obj):
     """Make an object's stand-in anew, after its kind or values changed; other meshes are left alone."""
     tag = obj.rayscope
-    if obj.type != "MESH" or obj.mode != "OBJECT" or tag.kind == "none" or not obj.data.get(MARK):
+    if obj.type != "MESH" or obj.mode != "OBJECT" or tag.kind == "none" or MARK not in obj.data:
+        return
+    if obj.data[MARK] == _signature(tag.kind, tag.capped, tag.ratio):
         return
     if obj.data.users > 1:
         obj.data = obj.data.copy()

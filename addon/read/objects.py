@@ -72,7 +72,7 @@ class Geometries:
 
     def __init__(self, depsgraph, materials, notices):
         self.materials, self.notices = materials, notices
-        self._meshes = {}
+        self._meshes, self._known = {}, {}
         self._primitives = Primitives(notices)
         self._booleans = Booleans(depsgraph, materials, notices)
         settings = getattr(depsgraph.scene, "rayscope", None)
@@ -80,8 +80,15 @@ class Geometries:
 
     def of(self, obj):
         """The geometry of an evaluated object, and its materials (a tuple of Read)."""
+        # Geometry nodes may place several meshes in the name of one object.
+        key = (obj.original.as_pointer(), obj.data and obj.data.as_pointer())
+        if key not in self._known:
+            self._known[key] = self._decide(obj)
+        return self._known[key]
+
+    def _decide(self, obj):
         tagged = kind_of(obj) != "none"
-        if self._booleans.has(obj):
+        if obj.modifiers and self._booleans.has(obj):
             if self._csg and (tree := self._booleans.of(obj)):
                 return tree
             if tagged:

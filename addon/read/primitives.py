@@ -44,11 +44,12 @@ class Primitives:
         """The geometry of a tagged, evaluated object; empty when it has none."""
         if obj.rayscope.kind == "polygon":
             return self._polygons(obj)
-        self._note_modifiers(obj)
-        kind, values = _kind_and_values(obj.rayscope)
-        key = (kind, *values.values())
+        if obj.modifiers:
+            self._note_modifiers(obj)
+        tag = obj.rayscope
+        key = (tag.kind, tag.capped, tag.ratio)
         if key not in self._shapes:
-            self._shapes[key] = Shapes([unit_solid(obj)], kind.title())
+            self._shapes[key] = Shapes([unit_solid(obj)], tag.kind.title())
         return self._shapes[key]
 
     def _polygons(self, obj):
