@@ -59,6 +59,10 @@ class Structure:
         """Hand every (ray, primitive) pair that can matter to ``query.test``."""
         raise NotImplementedError
 
+    def for_light(self, light):
+        """The structure to ask about shadow rays to one of the scene's lights: this one, unless it keeps something for each."""
+        return self
+
     def cells(self):
         """The structure's boxes.
 

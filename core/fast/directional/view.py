@@ -157,8 +157,19 @@ def _of_hulls(view, hull, first):
     """Columns of the footprints of the convex hulls of points, shape (3, k, m); those that the window does not show are left out."""
     with np.errstate(all="ignore"):
         x, y, z, away = view.points(hull)
-        largest = away.max(axis=0)
-        e = ROUNDING * view.scale * (largest + view.extra)
+        e = ROUNDING * view.scale * (away.max(axis=0) + view.extra)
+        item = np.arange(first, first + x.shape[1])
+        if view.perspective:
+            # Beyond one of the window's four sides, or behind the eye? NaN says no.
+            out = (z < -e).all(axis=0)
+            for w in (x, y):
+                wide = 1.01 * z + 4.0 * e
+                out |= (w > wide).all(axis=0) & (z > 0.0).all(axis=0) | (-w > wide).all(axis=0) & (z > 0.0).all(axis=0)
+            if out.any():
+                keep = np.flatnonzero(~out)
+                x, y, z, e, item = x[:, keep], y[:, keep], z[:, keep], e[keep], item[keep]
+                if not len(keep):
+                    return [item, *[np.zeros(0, np.float32) for _ in fields(Footprints)[1:]]]
         near_z = z.min(axis=0)
         if view.perspective:
             bounds = _plain_bounds(x, y, z, e)
@@ -184,7 +195,7 @@ def _of_hulls(view, hull, first):
         else:
             zero = np.zeros(len(shown), np.float32)
             edges = [bounds[0], zero, bounds[0], zero, bounds[1], zero, bounds[1], zero, zero, zero, nearest]
-    return [first + shown, *bounds, *edges, nearest]
+    return [item.take(shown), *bounds, *edges, nearest]
 
 
 def _plain_bounds(x, y, z, e):

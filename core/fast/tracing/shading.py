@@ -20,7 +20,7 @@ def lit(table, surface, d, lights, transmitted, key, check):
         Directions of the rays that met the surfaces.
     lights : list of Light
     transmitted : callable
-        ``transmitted(surface, which, to, reach)``: the share of light, shape (m,) or (3, m), that comes through to
+        ``transmitted(surface, which, to, reach, light)``: the share of light, shape (m,) or (3, m), that comes through to
         the points `which` from `to`.
     key : ndarray of uint64, or None
         Keys of the rays, where lights have an extent to be sampled.
@@ -59,7 +59,7 @@ def lit(table, surface, d, lights, transmitted, key, check):
                 cosine[which], flat[which], dot(surface.normal[:, which], surface.shading[:, which])
             )
         if light.shadows:
-            arrives = arrives * transmitted(surface, which, to[:, which], reach)
+            arrives = arrives * transmitted(surface, which, to[:, which], reach, light)
         total[:, which] += reflected * arrives * np.array(light.colour, float)[:, None]
     return total
 

@@ -116,6 +116,7 @@ class Whitted:
         self.check, self.threshold, self.roulette = check, threshold, roulette and threshold > 0.0
         probes = {id(s): Probe(s, check, count) for s in structures.values()}
         self.probe = {kind: probes[id(s)] for kind, s in structures.items()}
+        self.to_light = {}
         self.surfaces = Surfaces(scene)
         self.ambient = np.array(scene.world.ambient_light(), float)
         self.tally = {kind: dict.fromkeys(("rays", "hits", "saved", *COUNTED), 0) for kind in KINDS}
@@ -251,7 +252,7 @@ class Whitted:
                 surface,
                 wave.d[:, met],
                 self.lights,
-                lambda s, which, to, reach: self._transmitted(s, which, to, reach, pixel),
+                lambda s, which, to, reach, light: self._transmitted(s, which, to, reach, light, pixel),
                 key,
                 self.check,
             )
@@ -276,8 +277,9 @@ class Whitted:
             d = np.stack([dot(row, d) for row in np.asarray(world.rotation, float)])
         return colour * surroundings(world.image, d)
 
-    def _transmitted(self, surface, which, to, reach, pixel):
-        """Share of light that reaches the surfaces `which` from where `to` points; the shadow rays."""
+    def _transmitted(self, surface, which, to, reach, light, pixel):
+        """Share of a light that reaches the surfaces `which` from where `to` points; the shadow rays."""
+        probe = self._towards(light)
         point = surface.point[:, which]
         o = pushed(point, surface.error[which], surface.normal[:, which], to)
         d = to
@@ -288,13 +290,13 @@ class Whitted:
             reach = np.maximum(1.0 - self.rounding / np.abs(d).max(axis=0), 0.0)
         pixel = pixel[which]
         if not self.coloured_shadows:
-            blocked, counts = self.probe["shadow"].occluded(o, d, reach)
+            blocked, counts = probe.occluded(o, d, reach)
             self._count(SHADOW, pixel, np.count_nonzero(blocked), counts)
             return 1.0 - blocked
         from .shadows import filtered
 
         def closest(which, o, d, t_max):
-            hits = self.probe["shadow"].closest(o, d, 0.0, t_max)
+            hits = probe.closest(o, d, 0.0, t_max)
             self._count(
                 SHADOW,
                 pixel[which],
@@ -304,6 +306,17 @@ class Whitted:
             return hits
 
         return filtered(closest, self.surfaces, o, d, reach)
+
+    def _towards(self, light):
+        """Who is asked about shadow rays to a light."""
+        probe = self.to_light.get(id(light))
+        if probe is None:
+            structure = self.probe["shadow"].structure.for_light(light)
+            probe = self.probe["shadow"]
+            if structure is not probe.structure:
+                probe = Probe(structure, self.check, self.count)
+            self.to_light[id(light)] = probe
+        return probe
 
     def _onward(self, wave, hits, met, surface):
         """The waves of rays that the surfaces send on."""

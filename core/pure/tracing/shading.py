@@ -17,7 +17,7 @@ def lit(surface, d, lights, transmitted, key):
         Direction of the ray that met the surface.
     lights : list of Light
     transmitted : callable
-        ``transmitted(surface, to, reach)``: the share of light, a colour, that comes through to the surface from `to`.
+        ``transmitted(surface, to, reach, light)``: the share of light, a colour, that comes through to the surface from `to`.
     key : int or None
         Key of the ray, where lights have an extent to be sampled.
 
@@ -48,7 +48,7 @@ def lit(surface, d, lights, transmitted, key):
             arrives *= terminator(cosine, flat, dot(surface.normal, normal))
         colour = times(arrives, tuple(map(float, light.colour)))
         if light.shadows:
-            colour = mul(colour, transmitted(surface, to, reach))
+            colour = mul(colour, transmitted(surface, to, reach, light))
         total = add(total, mul(reflected, colour))
     return total
 

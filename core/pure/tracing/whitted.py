@@ -98,6 +98,7 @@ class Whitted:
         )
         self.check, self.threshold, self.roulette = check, threshold, roulette and threshold > 0.0
         self.probe = {kind: Probe(s, count) for kind, s in structures.items()}
+        self.to_light = {}
         self.surfaces = Surfaces(scene)
         self.ambient = scene.world.ambient_light()
         self.tally = {kind: dict.fromkeys(("rays", "hits", "saved", *COUNTED), 0) for kind in KINDS}
@@ -158,9 +159,9 @@ class Whitted:
             stack += self._onward(path, hit, surface)
         return {"combined": radiance, **self.spent, **(self._first(*first) if with_first else {})}
 
-    def _closest(self, kind, o, d, t_min, t_max):
+    def _closest(self, kind, o, d, t_min, t_max, probe=None):
         """The nearest hit, counted."""
-        probe = self.probe["primary" if kind == PRIMARY else "shadow" if kind == SHADOW else "secondary"]
+        probe = probe or self.probe["primary" if kind == PRIMARY else "secondary"]
         hit, counter = probe.closest(o, d, t_min, t_max)
         self._count(kind, hit is not None, counter)
         return hit
@@ -220,7 +221,7 @@ class Whitted:
             d = tuple(dot(tuple(map(float, row)), d) for row in world.rotation)
         return mul(colour, surroundings(world.image, d))
 
-    def _transmitted(self, surface, to, reach):
+    def _transmitted(self, surface, to, reach, light):
         """Share of light, a colour, that reaches a surface from where `to` points; the shadow ray."""
         o = pushed(surface.point, surface.error, surface.normal, to)
         d = to
@@ -230,12 +231,19 @@ class Whitted:
             d = add(to, minus(surface.point, o))
             reach = max(1.0 - self.rounding / max(map(abs, d)), 0.0)
         if not self.coloured_shadows:
-            blocked, counter = self.probe["shadow"].occluded(o, d, reach)
+            blocked, counter = self._towards(light).occluded(o, d, reach)
             self._count(SHADOW, blocked, counter)
             return (0.0, 0.0, 0.0) if blocked else (1.0, 1.0, 1.0)
         from .shadows import filtered
 
-        return filtered(lambda o, d, t_max: self._closest(SHADOW, o, d, 0.0, t_max), self.surfaces, o, d, reach)
+        probe = self._towards(light)
+        return filtered(lambda o, d, t_max: self._closest(SHADOW, o, d, 0.0, t_max, probe), self.surfaces, o, d, reach)
+
+    def _towards(self, light):
+        """Who is asked about shadow rays to a light."""
+        if id(light) not in self.to_light:
+            self.to_light[id(light)] = Probe(self.probe["shadow"].structure.for_light(light), self.count)
+        return self.to_light[id(light)]
 
     def _onward(self, path, hit, surface):
         """Yield the rays that a surface sends on."""

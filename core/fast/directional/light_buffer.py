@@ -1,0 +1,193 @@
+"""The light buffer (Haines and Greenberg 1986): a direction cube in every light, for the shadow rays that go there.
+
+A shadow ray need only be tested against what is listed in the cell through which the light sees its origin, as far as
+that origin. The sun has one parallel grid. Rays that go to no light, to a light with an extent, or beyond their light
+are handed over.
+"""
+
+import math
+
+import numpy as np
+
+from ...errors import Notice
+from ..structure import Structure
+from .cube import Cube
+from .lists import LOSS, Lists
+from .second import Handing
+from .view import View
+
+#: How far beside a light a ray may pass, relative to the largest coordinate; well within the footprints' own rounding.
+BESIDE = 2.0**-46
+#: A batch of rays whose light is not told is compared with so many lights.
+LIGHTS_TRIED = 16
+
+
+class LightBuffer(Handing):
+    """A buffer for each light, made when its first shadow ray comes.
+
+    Attributes
+    ----------
+    buffers : dict
+        Light's number -> buffer, the most recently used last.
+    """
+
+    def build(self, progress, resolution, max_bytes):
+        self.resolution, self.max_bytes = resolution, max_bytes
+        self.buffers = {}
+        p = self.primitives
+        with np.errstate(all="ignore"):
+            self.extra = 2.0 * float(max(np.abs(p.lo).max(), np.abs(p.hi).max()))
+        self.lights = [light for light in getattr(self.scene, "lights", ()) if self._fits(light)]
+        if not self.lights:
+            self.notices.append(self.needs("a point, spot or sun light", "Add one, or name another technique for shadow rays."))
+
+    def _fits(self, light):
+        """Whether a light has one place or one direction."""
+        where = light.direction if light.kind == "sun" else light.position
+        return light.kind in ("point", "spot", "sun") and bool(np.isfinite(where).all()) and (light.kind != "sun" or any(where))
+
+    def for_light(self, light):
+        """The structure for shadow rays to one light."""
+        number = next((k for k, own in enumerate(self.lights if self.primitives.n else ()) if own is light), None)
+        return self if number is None else OneLight(self, number)
+
+    def traverse(self, rays, query):
+        left = np.arange(rays.n)
+        for number in range(min(len(self.lights), LIGHTS_TRIED)):
+            left = self.serve(number, rays, query, left)
+            if not len(left):
+                return
+        self.hand_over(rays, query, left if len(left) < rays.n else None)
+
+    def buffer(self, number):
+        """The buffer of a light; makes room for it when there is too little."""
+        buffer = self.buffers.pop(number, None)
+        if buffer is None:
+            light = self.lights[number]
+            kind = _Sun if light.kind == "sun" else _Point
+            buffer = kind(light, self.primitives, self.extra, self.resolution, self.max_bytes)
+        self.buffers[number] = buffer
+        return buffer
+
+    def serve(self, number, rays, query, which):
+        """Test those of the rays `which` that go to a light; the others."""
+        if not len(which):
+            return which
+        buffer = self.buffer(number)
+        own = buffer.test(rays, query, which)
+        while len(self.buffers) > 1 and sum(b.nbytes for b in self.buffers.values()) > self.max_bytes:
+            self.buffers.pop(next(iter(self.buffers)))
+        used = sum(b.nbytes for b in self.buffers.values())
+        self.figures.update(N_ER=sum(b.references for b in self.buffers.values()))
+        if used > self.max_bytes and not any(n.name == self.lights[number].name for n in self.notices):
+            self.notices.append(Notice(self.lights[number].name, f"its buffer takes {used} bytes, more than max_bytes = {self.max_bytes:g}, though "
+                                       "its resolution was lowered. Raise max_bytes, or name another technique for shadow rays."))
+        return which[~own]
+
+
+class OneLight(Structure):
+    """Shadow rays to one light of a light buffer; those that go elsewhere are handed over."""
+
+    def __init__(self, owner, number):
+        self.owner, self.number = owner, number
+        self.primitives, self.parameters, self.figures, self.notices = owner.primitives, owner.parameters, owner.figures, owner.notices
+        self.scene, self.technique = owner.scene, getattr(owner, "technique", None)
+
+    def traverse(self, rays, query):
+        left = self.owner.serve(self.number, rays, query, np.arange(rays.n))
+        if len(left):
+            self.owner.hand_over(rays, query, left if len(left) < rays.n else None)
+
+
+class _Point:
+    """The direction cube of a point or spot light."""
+
+    def __init__(self, light, primitives, extra, resolution, most_bytes):
+        self.extra = max(extra, float(np.abs(light.position).max()))
+        self.cube = Cube(light.position, primitives, self.extra, resolution, most_bytes / 6.0)
+
+    @property
+    def nbytes(self):
+        return self.cube.nbytes
+
+    @property
+    def references(self):
+        return sum(len(face.entry) for face in self.cube.faces.values())
+
+    def test(self, rays, query, which):
+        """Test those of the rays `which` that go to the light; a mask of them."""
+        o, d, t_min, t_max = (rays.o, rays.d, rays.t_min, rays.t_max) if len(which) == rays.n else _some(rays, which)
+        with np.errstate(all="ignore"):
+            w = o - self.cube.position[:, None]
+            squared = d[0] * d[0] + d[1] * d[1] + d[2] * d[2]
+            reach = -(w[0] * d[0] + w[1] * d[1] + w[2] * d[2]) / squared
+            beside = np.maximum(np.maximum(np.abs(w[0] + reach * d[0]), np.abs(w[1] + reach * d[1])), np.abs(w[2] + reach * d[2]))
+            far = np.maximum(np.maximum(np.abs(o[0]), np.abs(o[1])), np.abs(o[2]))
+            own = ((beside <= BESIDE * self.extra) & (far <= self.extra) & (reach > 0.0) & (t_max <= reach) & (t_min >= 0.0)
+                   & (reach * np.sqrt(squared) > 2.0**-30 * self.extra))
+        if not own.any():
+            return own
+        if not own.all():
+            some = np.flatnonzero(own)
+            w, ray, start = w[:, some], which[some], t_min[some] / reach[some]
+        else:
+            ray, start = which, t_min / reach
+        number, u, v, z = Cube.through(w)
+        # From the light, what lies farther than the ray's beginning does not matter.
+        with np.errstate(divide="ignore"):
+            nearness = (1.0 - 4.0 * LOSS) / (z * (1.0 - start))
+        for k in np.flatnonzero(np.bincount(number, minlength=6)):
+            at = np.flatnonzero(number == k)
+            self.cube.face(int(k)).test(query, ray[at], u[at], v[at], nearness[at])
+        return own
+
+
+class _Sun:
+    """The parallel grid of the sun."""
+
+    def __init__(self, light, primitives, extra, resolution, most_bytes):
+        forward = np.array(light.direction, float)
+        forward /= np.linalg.norm(forward)
+        right = np.cross(forward, np.eye(3)[np.abs(forward).argmin()])
+        right /= np.linalg.norm(right)
+        lo, hi = primitives.lo.min(axis=0), primitives.hi.max(axis=0)
+        radius = 0.5 * float(np.linalg.norm(hi - lo)) * 1.01 or 1.0
+        centre = 0.5 * (lo + hi)
+        # The scene lies behind the plane where z = 0, and within the window.
+        view = View(centre - 2.0 * radius * forward, right, np.cross(forward, right), forward, (-radius, radius) * 2, False, extra)
+        self.view, self.extra = view, view.extra
+        self.lists, self._make = None, lambda: Lists(view, primitives, resolution, most_bytes)
+
+    @property
+    def nbytes(self):
+        return self.lists.nbytes if self.lists else 0
+
+    @property
+    def references(self):
+        return len(self.lists.entry) if self.lists else 0
+
+    def test(self, rays, query, which):
+        """Test those of the rays `which` that go to the sun; a mask of them."""
+        if not self.view.usable:
+            return np.zeros(len(which), bool)
+        o, d, t_min, _ = (rays.o, rays.d, rays.t_min, rays.t_max) if len(which) == rays.n else _some(rays, which)
+        view = self.view
+        forward = view.rows[2]
+        along = forward[0] * d[0] + forward[1] * d[1] + forward[2] * d[2]
+        across = np.maximum.reduce([np.abs(d[a] - along * forward[a]) for a in range(3)])
+        with np.errstate(all="ignore"):
+            far = np.maximum(np.maximum(np.abs(o[0]), np.abs(o[1])), np.abs(o[2]))
+            own = (along < 0.0) & (across <= 2.0**-48 * np.abs(along)) & (far <= self.extra) & (t_min >= 0.0)
+            u, v, z, _ = view.points(o)
+        seen = np.flatnonzero(own & (np.abs(u) <= 1.0) & (np.abs(v) <= 1.0))
+        if len(seen):
+            self.lists = self.lists or self._make()
+            start = z[seen] + t_min[seen] * along[seen]
+            nearness = -start - 4.0 * LOSS * (np.abs(start) + np.abs(z[seen]))
+            self.lists.test(query, which[seen], u[seen], v[seen], nearness)
+        return own
+
+
+def _some(rays, which):
+    part = rays.take(which)
+    return part.o, part.d, part.t_min, part.t_max
