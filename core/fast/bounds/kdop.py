@@ -93,15 +93,17 @@ def _area(columns):
         for h in range(2 * half):
             if h in (f, g):
                 continue
-            room = d[h] - p * (normals[h] @ normals[f]) - q * (normals[h] @ normals[g])
+            hf, hg = normals[h] @ normals[f], normals[h] @ normals[g]
+            room = d[h] - p * hf - q * hg
             speed = normals[h] @ e
             if speed > 0.0:
                 np.minimum(end, room / speed, out=end)
             elif speed < 0.0:
                 np.maximum(begin, room / speed, out=begin)
             else:
-                # A plane through the same line: of those the first two count.
-                end[(room < -tiny) | ((room <= tiny) & (h < g))] = -np.inf
+                # Of several planes through one line, neighbours count: no other's normal is between theirs.
+                between_them = hf * gg > hg * fg and hg * ff > hf * fg
+                end[room < (tiny if between_them else -tiny)] = -np.inf
         length = np.maximum(end - begin, 0.0) * np.sqrt(ee)
         length[~np.isfinite(length)] = 0.0
         area += 0.5 * length * ((d[g] - d[f] * fg / ff) / np.sqrt(gg - fg * fg / ff) + (d[f] - d[g] * fg / gg) / np.sqrt(ff - fg * fg / gg))

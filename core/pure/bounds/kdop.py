@@ -79,14 +79,14 @@ class KDop(Volume):
             # The line's point nearest to the middle: p normals[f] + q normals[g].
             p, q = (d[f] * gg - d[g] * fg) / ee, (d[g] * ff - d[f] * fg) / ee
             begin, end = -math.inf, math.inf
-            for h, hf, hg, speed in cuts:
+            for h, hf, hg, speed, between_them in cuts:
                 room = d[h] - p * hf - q * hg
                 if speed > 0.0:
                     end = min(end, room / speed)
                 elif speed < 0.0:
                     begin = max(begin, room / speed)
-                elif room < -tiny or (room <= tiny and h < g):
-                    end = -math.inf                     # a plane through the same line: of those the first two count
+                elif room < (tiny if between_them else -tiny):
+                    end = -math.inf                     # of several planes through one line, neighbours count
                 if begin >= end:
                     break
             else:
@@ -131,6 +131,11 @@ def _lines(k):
         a, b = normals[f], normals[g]
         e = (a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0])
         if any(e):
-            cuts = [(h, _dot(normals[h], a), _dot(normals[h], b), _dot(normals[h], e)) for h in range(k) if h not in (f, g)]
-            out.append((f, g, _dot(a, a), _dot(b, b), _dot(a, b), _dot(e, e), cuts))
+            aa, bb, ab, cuts = _dot(a, a), _dot(b, b), _dot(a, b), []
+            for h, n in enumerate(normals):
+                if h not in (f, g):
+                    ha, hb = _dot(n, a), _dot(n, b)
+                    # The normal is between the two.
+                    cuts.append((h, ha, hb, _dot(n, e), ha * bb > hb * ab and hb * aa > ha * ab))
+            out.append((f, g, aa, bb, ab, _dot(e, e), cuts))
     return out
