@@ -62,6 +62,9 @@ PASSES = {
 }
 COUNTED_PASSES = ("n_it", "n_ts")
 
+#: The name that leaves the choice to :mod:`~rayscope.core.lab.needs`; and what serves rays that are not needed.
+AUTOMATIC, STANDARD = "automatic", "bvh"
+
 #: Share of the progress bar that building takes.
 BUILDING = 0.1
 #: Seconds between two calls of `progress`, at least: often enough to stop a run in time.
@@ -317,8 +320,10 @@ class Rendering:
             "secondary": (secondary, bounces or any(m.transparent for m in materials)),
             "shadow": (shadow, any(light.shadows and any(light.colour) for light in self.scene.lights)),
         }
+        automatic = self._automatic(technique, index, needed, depth)
         wanted = {}
         for kind, (choice, need) in needed.items():
+            choice = automatic.get(kind, choice)
             if choice is None and index is not None:
                 wanted[kind] = None
                 continue
@@ -334,6 +339,18 @@ class Rendering:
                     f"{name} serves {' and '.join(row.rays)} rays only; name another technique for {kind} rays."
                 )
         return {kind: choice for kind, choice in wanted.items() if needed[kind][1]}
+
+    def _automatic(self, technique, index, needed, depth):
+        """Kind of ray -> technique, with no parameters, for the kinds that were left to us."""
+        left = technique if index is None else None
+        open_kinds = [kind for kind, (choice, _) in needed.items() if (left if choice is None else choice) == AUTOMATIC]
+        kinds = [kind for kind in open_kinds if needed[kind][1]]
+        chosen = {}
+        if kinds:
+            from .lab.needs import resolve_automatic
+
+            chosen = resolve_automatic(self.scene, self.size, self.samples, depth, self.core, kinds)
+        return {kind: (chosen.get(kind, STANDARD), {}) for kind in open_kinds}
 
     def _build(self, wanted, index):
         """Build every different structure once."""
