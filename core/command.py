@@ -23,6 +23,7 @@ from .errors import Cancelled, MemoryEstimateError, MissingPackageError, Paramet
 from .figures import FIGURES
 from .lab import report
 from .parameters import resolve
+from .rendering import AUTOMATIC
 from .scene.camera import check_size
 from .scene.files import ENDINGS, read_file
 
@@ -192,6 +193,8 @@ def checked(choice, core):
     ParameterError
     """
     name, given = choice
+    if name == AUTOMATIC and not given:
+        return name, {}
     row = technique(name)
     if core not in row.cores:
         raise ParameterError(f"{name} has no core {core!r}. It has: {', '.join(row.cores)}.")
@@ -295,7 +298,7 @@ def trace_verb(call):
     fewer = {name: getattr(call, name) for name in ("threshold", "roulette", "antialiasing", "aa_threshold", "aa_level")}
     scene = call.scene(call.size)
     size = call.size or proportional(scene.camera)
-    expected = estimate(scene, name, call.core, size, max(call.samples, 1), max(call.depth, 0)).check_memory()
+    expected = estimate(scene, "bvh" if name == AUTOMATIC else name, call.core, size, max(call.samples, 1), max(call.depth, 0)).check_memory()
     if expected.seconds > LONG_SECONDS:
         say(expected.lines()[0])
     with stoppable() as progress:
@@ -486,6 +489,33 @@ def motion_verb(call):
     return Outcome(motion.text(result), record)
 
 
+# --- needs ------------------------------------------------------------------------------------------------------------
+
+def needs_options(sub):
+    sub.add_argument("--core", choices=CORES, default="fast")
+    sub.add_argument("--size", metavar="WxH", type=picture_size, help=f"pixels; without it {DEFAULT_SIDE} on the longer side")
+    sub.add_argument("--depth", type=whole(0, 10_000), default=5, help="reflections and refractions in a row, at most")
+    sub.add_argument("--samples", type=whole(1, 1_000_000), default=1, help="samples a pixel")
+    sub.add_argument("--check", action="store_true", help="trace with the automatic choice and with each fixed one, and compare")
+
+
+def needs_verb(call):
+    """What the scene needs, what is left out and why."""
+    from dataclasses import asdict
+
+    from .lab import needs
+
+    scene = call.scene(call.size)
+    size = call.size or proportional(scene.camera)
+    plan = needs.plan(scene, size, call.samples, call.depth, call.core)
+    record = report.record("needs", scene, None, {"core": call.core, "size": size, "depth": call.depth, "samples": call.samples}, plan=asdict(plan))
+    text = needs.text(plan)
+    if call.check:
+        record["check"] = needs.against_fixed(scene, size, call.core)
+        text += "\n\nTraced:\n" + report.table([record["check"]], list(record["check"]))
+    return Outcome(text, record)
+
+
 @dataclass(frozen=True)
 class Verb:
     """One verb.
@@ -515,4 +545,5 @@ VERBS = {
     "motion": Verb("refit trees after motion, against new ones; what the order of insertion does", motion_verb, motion_options),
     "bench": Verb("measure against mathutils' BVHTree and Embree", bench_verb, bench_options, scene=False),
     "stability": Verb("run techniques on stiff and extreme cases against exact arithmetic", stability_verb, stability_options, scene=False),
+    "needs": Verb("say what the scene needs, what is left out and why", needs_verb, needs_options),
 }
