@@ -1,5 +1,7 @@
 """Objects tagged as Rayscope primitives: what is traced for them, their instances, and how they are shown."""
 
+import subprocess
+import sys
 import time
 
 import bpy
@@ -233,3 +235,16 @@ def test_the_tag_is_kept_in_the_file(empty_scene, tmp_path):
     bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "kept.blend"))
     tag = bpy.data.objects["Kept"].rayscope
     assert (tag.kind, tag.capped, tag.ratio) == ("cone", False, 0.25)
+
+
+@pytest.mark.skipif(not bpy.app.module, reason="the command opens files in the bpy module")
+def test_the_command_reads_tags_and_settings_though_the_extension_is_not_enabled(empty_scene, tmp_path):
+    tagged("cone", "Kept", ratio=0.25)
+    bpy.ops.mesh.primitive_cube_add()
+    bpy.context.object.modifiers.new("Boolean", "BOOLEAN").object = bpy.data.objects.new("Ball", bpy.data.meshes.new("None"))
+    bpy.context.scene.rayscope.csg = False
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "kept.blend"))
+    code = ("import bpy, os, sys; from rayscope.addon.open_file import open_file; scene = open_file(sys.argv[1]); "
+            "print([(o.name, type(o.geometry).__name__) for o in scene.objects], [n.name for n in scene.notices], flush=True); os._exit(0)")
+    done = subprocess.run([sys.executable, "-c", code, str(tmp_path / "kept.blend")], text=True, capture_output=True, timeout=60)
+    assert "[('Kept', 'Shapes'), ('Cube', 'Mesh')] ['Scene']" in done.stdout, done  # without a camera, and no word of the Boolean
