@@ -279,6 +279,7 @@ def trace_options(sub):
     sub.add_argument("--antialiasing", choices=("uniform", "corners", "variance"), default="uniform",
                      help="equally many samples in all pixels, or more where corners differ or where the variance is high")
     sub.add_argument("--aa-threshold", type=float, default=0.03, help="difference in displayed values, 0 to 1, that is put up with")
+    sub.add_argument("--light-samples", type=int, default=1, help="shadow rays to each light that has an extent")
     sub.add_argument("--aa-level", type=int, default=2, help="adaptive antialiasing: 4^level samples a pixel, at most")
     sub.add_argument("--count", action="store_true", help="count tests and steps (slower)")
     sub.add_argument("--image", metavar="OUT.png", help="write the picture")
@@ -295,7 +296,7 @@ def trace_verb(call):
     others = {kind: checked(choice, call.core) for kind in ("primary", "secondary", "shadow") if (choice := getattr(call, kind))}
     check_output("--image", call.image)
     check_output("--figures", call.figures)
-    fewer = {name: getattr(call, name) for name in ("threshold", "roulette", "antialiasing", "aa_threshold", "aa_level")}
+    fewer = {name: getattr(call, name) for name in ("threshold", "roulette", "antialiasing", "aa_threshold", "aa_level", "light_samples")}
     scene = call.scene(call.size)
     size = call.size or proportional(scene.camera)
     expected = estimate(scene, "bvh" if name == AUTOMATIC else name, call.core, size, max(call.samples, 1), max(call.depth, 0)).check_memory()

@@ -45,6 +45,7 @@ PARAMETERS = (
         low=0.0,
         high=1.0,
     ),
+    Parameter("light_samples", 1, "Shadow rays to each light that has an extent, per surface met", low=1, high=4096),
     Parameter("aa_level", 2, "Adaptive antialiasing: 4^level samples a pixel, at most", low=1, high=8),
 )
 
@@ -131,6 +132,7 @@ def trace(
     antialiasing="uniform",
     aa_threshold=0.03,
     aa_level=2,
+    light_samples=1,
 ):
     """Trace a picture as Whitted (1980) did.
 
@@ -182,6 +184,9 @@ def trace(
         pixel.
     aa_level : int
         4**aa_level samples a pixel, at most; corners are divided `aa_level` times.
+    light_samples : int
+        Shadow rays to each light that has an extent, wherever a surface is shaded. With more than one, its shadows are
+        soft also with one sample a pixel.
 
     Returns
     -------
@@ -220,6 +225,7 @@ def trace(
         antialiasing,
         aa_threshold,
         aa_level,
+        light_samples,
     )
     for tile in rendering.tiles():
         if on_tile:
@@ -260,11 +266,13 @@ class Rendering:
         antialiasing="uniform",
         aa_threshold=0.03,
         aa_level=2,
+        light_samples=1,
     ):
         if core not in CORES:
             raise ParameterError(f"trace: there is no core {core!r}. Cores: {', '.join(CORES)}.")
         given = {"depth": depth, "samples": samples, "seed": seed, "threshold": threshold, "roulette": roulette}
         given |= {"antialiasing": antialiasing, "aa_threshold": aa_threshold, "aa_level": aa_level}
+        given["light_samples"] = light_samples
         values = resolve("trace", PARAMETERS, given, core)
         self.scene, self.core, self.count = scene, core, bool(count)
         self.samples = values["samples"]
@@ -299,6 +307,7 @@ class Rendering:
             self._check,
             values["threshold"],
             values["roulette"],
+            values["light_samples"],
         )
         self._adaptive = None
         if antialiasing != "uniform":

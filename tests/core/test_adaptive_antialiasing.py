@@ -204,3 +204,18 @@ def test_tiles_tell_what_has_become_better(way):
 def test_impossible_values(bad):
     with pytest.raises(ParameterError, match=next(iter(bad))):
         trace(half(), size=(2, 2), **{"antialiasing": "corners", **bad})
+
+
+def test_shadow_rays_to_a_light_count_and_smooth():
+    """One light sampled four times: four times the shadow rays, half the noise, in both cores the same."""
+    scene = lit()
+    fast, pure = (trace(scene, "brute", core, (9, 7), 2, samples=2, light_samples=3) for core in ("fast", "pure"))
+    np.testing.assert_allclose(fast.image, pure.image, atol=1e-5)
+    once = trace(scene, "brute", size=(9, 7), depth=2, samples=2)
+    assert fast.figures["shadow"]["rays"] == pure.figures["shadow"]["rays"]
+    assert 2.5 * once.figures["shadow"]["rays"] < fast.figures["shadow"]["rays"] < 3.5 * once.figures["shadow"]["rays"]
+    assert fast.figures["primary"] == once.figures["primary"]
+    # The floor's penumbra, through pixel centres, so that lights alone make noise.
+    runs = {n: np.stack([trace(scene, size=(20, 15), depth=0, light_samples=n, seed=s).image for s in range(8)]) for n in (4, 16)}
+    noise = {n: math.sqrt(np.mean(images.var(axis=0))) for n, images in runs.items()}
+    assert 0.35 < noise[16] / noise[4] < 0.7

@@ -18,7 +18,8 @@ def lit(table, surface, d, lights, transmitted, key, check):
     surface : Surface
     d : ndarray, shape (3, n)
         Directions of the rays that met the surfaces.
-    lights : list of Light
+    lights : list of (Light, float)
+        Each with the share of it that is to be added: a light that is sampled n times is there n times, by 1 / n.
     transmitted : callable
         ``transmitted(surface, which, to, reach, light)``: the share of light, shape (m,) or (3, m), that comes through to
         the points `which` from `to`.
@@ -33,7 +34,7 @@ def lit(table, surface, d, lights, transmitted, key, check):
     """
     total = np.zeros_like(surface.base)
     view = unit(d)
-    for k, light in enumerate(lights):
+    for k, (light, share) in enumerate(lights):
         check()
         u, v = (None, None) if key is None else (number(key, LIGHTS + 2 * k), number(key, LIGHTS + 2 * k + 1))
         to, reach, towards, irradiance = arriving(light, surface.point, u, v)
@@ -53,7 +54,7 @@ def lit(table, surface, d, lights, transmitted, key, check):
         which, reflected = which[some], reflected[:, some]
         if not len(which):
             continue
-        arrives = irradiance[which] / math.pi
+        arrives = irradiance[which] * (share / math.pi)
         if surface.shading is not surface.normal:
             arrives = arrives * terminator(
                 cosine[which], flat[which], dot(surface.normal[:, which], surface.shading[:, which])

@@ -15,7 +15,8 @@ def lit(surface, d, lights, transmitted, key):
     surface : Surface
     d : tuple of 3 float
         Direction of the ray that met the surface.
-    lights : list of Light
+    lights : list of (Light, float)
+        Each with the share of it that is to be added: a light that is sampled n times is there n times, by 1 / n.
     transmitted : callable
         ``transmitted(surface, to, reach, light)``: the share of light, a colour, that comes through to the surface from `to`.
     key : int or None
@@ -29,7 +30,7 @@ def lit(surface, d, lights, transmitted, key):
     total = (0.0, 0.0, 0.0)
     view = unit(d)
     material, base, normal = surface.material, surface.base, surface.shading
-    for k, light in enumerate(lights):
+    for k, (light, share) in enumerate(lights):
         u, v = (None, None) if key is None else (number(key, LIGHTS + 2 * k), number(key, LIGHTS + 2 * k + 1))
         to, reach, towards, irradiance = arriving(light, surface.point, u, v)
         cosine = dot(normal, towards)
@@ -43,7 +44,7 @@ def lit(surface, d, lights, transmitted, key):
         # Mirrors and glass reflect little but their narrow highlights: no shadow ray where there is nothing to shade.
         if not any(reflected):
             continue
-        arrives = irradiance / math.pi
+        arrives = irradiance * (share / math.pi)
         if normal is not surface.normal:
             arrives *= terminator(cosine, flat, dot(surface.normal, normal))
         colour = times(arrives, tuple(map(float, light.colour)))

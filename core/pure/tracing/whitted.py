@@ -76,6 +76,8 @@ class Whitted:
     roulette : bool
         Such a ray is traced with the probability weight / threshold, and then weighs `threshold` (Arvo and Kirk 1990):
         noise, where leaving it out makes the picture too dark.
+    light_samples : int
+        Shadow rays to each light that has an extent.
 
     Attributes
     ----------
@@ -86,7 +88,8 @@ class Whitted:
     tile_side = TILE
 
     def __init__(
-        self, scene, structures, size, depth, samples, seed, count, check, threshold=0.0, roulette=False
+        self, scene, structures, size, depth, samples, seed, count, check, threshold=0.0, roulette=False,
+        light_samples=1
     ):
         self.scene, self.size, self.depth, self.samples, self.seed, self.count = (
             scene,
@@ -106,13 +109,16 @@ class Whitted:
         self.bounces = depth > 0 and any(m.reflects for m in materials)
         self.transparent = any(m.transparent for m in materials)
         self.coloured_shadows = self.transparent or any(m.refracts for m in materials)
-        self.lights = [light for light in scene.lights if any(light.colour)]
+        lights = [light for light in scene.lights if any(light.colour)]
+        self.lights = [
+            (light, 1.0 / n) for light in lights for n in (light_samples if light.has_extent else 1,) for _ in range(n)
+        ]
         self.rounding = (
             ROUNDING * max(abs(x) for corner in scene.bounds() for x in corner.tolist())
             if "shadow" in structures
             else 0.0
         )
-        self.soft = samples > 1 and any(light.has_extent for light in self.lights)
+        self.soft = (samples > 1 or light_samples > 1) and any(light.has_extent for light in lights)
 
     def tile(self, x0, y0, x1, y1, sample):
         """One sample of every pixel with x0 <= x < x1, y0 <= y < y1.
@@ -134,7 +140,7 @@ class Whitted:
     def pixel(self, x, y, sample):
         """One sample of a pixel; what it returns is named as in :meth:`tile`."""
         random = self.samples > 1
-        key = sampling.first_key(y * self.size[0] + x, sample, self.seed) if random or self.roulette else None
+        key = sampling.first_key(y * self.size[0] + x, sample, self.seed) if random or self.soft or self.roulette else None
         o, d = primary(self.scene.camera, self.size, x, y, key if random else None)
         return self.traced(o, d, key, not sample)
 
