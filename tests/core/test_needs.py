@@ -1,0 +1,162 @@
+"""What a picture needs: the survey, the model, the choice, and that nothing else is imported or built."""
+import json
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+from rayscope.core import Camera, Light, Material, Mesh, Object, Scene, Shapes, solids, trace
+from rayscope.core.command import main
+from rayscope.core.lab import needs
+
+
+def scene_of(materials=(Material(),), lights=(), objects=(), copies=1):
+    mesh = needs._even(40).objects[0].geometry
+    camera = Camera.look_at((3.0, -3.0, 2.0), (0.0, 0.0, 0.0))
+    placed = [Object(f"mesh {k}", mesh, np.array([[1, 0, 0, 3.0 * k], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1.0]]), materials) for k in range(copies)]
+    return Scene([*placed, *objects], list(lights), camera)
+
+
+
+def test_survey():
+    glass, mirror = Material("glass", transmission=1.0), Material("mirror", mirror=0.5)
+    seen = needs.survey(scene_of((glass, mirror), objects=[Object("ball", Shapes([solids.sphere((0, 0, 3), 1.0)]))], copies=3))
+    assert seen.kinds == {"triangle": 120, "sphere": 1} and seen.n == 121
+    assert seen.glass == ["glass"] and seen.mirrors == ["mirror"] and not seen.transparent and not seen.lights
+    assert seen.size > 6.0 and 7.0 < seen.coordinate < 9.0
+    even, uneven = needs.survey(needs._even(2000)), needs.survey(needs._uneven(2000))
+    assert even.clutter < 5.0 < 50.0 < uneven.clutter
+    assert needs.survey(Scene()).n == 0
+    broken = Scene.from_triangles([(0, 0, 0), (1, 0, 0), (0, np.nan, 0), (0, 1, 0)], [(0, 1, 2), (0, 1, 3)])
+    assert needs.survey(broken).clutter >= 1.0
+
+
+def test_looking_is_cheap():
+    from time import thread_time
+    from rayscope.core import build
+    scene = needs._even(60_000)
+    look = build_it = np.inf
+    for _ in range(2):
+        start = thread_time()
+        needs.survey(scene)
+        look = min(look, thread_time() - start)
+    start = thread_time()
+    build(scene, "bvh")
+    build_it = thread_time() - start
+    assert look < 0.05 * build_it
+
+
+@pytest.mark.parametrize("core", ["fast", "pure"])
+def test_calibration(core):
+    models, _ = needs.calibration(core)
+    assert {"bvh", "brute"} <= set(models) and needs.calibration(core)[0] is models
+    n_it, _, seconds = models["brute"].per_ray("primary", 5000, 1.0)
+    assert 2500 < n_it < 10_000 and seconds > 0.0
+    small, large = models["bvh"].per_ray("primary", 1000, 1.0), models["bvh"].per_ray("primary", 100_000, 1.0)
+    assert small[1] < large[1] < 10 * small[1]                          # a tree
+    assert models["bvh"].per_ray("primary", 5000, 1.0)[2] < seconds
+    assert all(m.build_seconds(10_000) > m.build_seconds(100) for m in models.values())
+
+
+def test_choice():
+    seen = needs.survey(needs._even(20_000))
+    choice, rows = needs.choose(seen, {"primary": 100_000, "shadow": 100_000})
+    assert set(choice) == {"primary", "shadow"} and "brute" not in choice.values()
+    assert [r["s"] for r in rows] == sorted(r["s"] for r in rows)
+    models, _ = needs.calibration()
+    costs = {name: m.build_seconds(seen.n) + sum(m.per_ray(k, seen.n, seen.clutter)[2] for k in choice) * 100_000 for name, m in models.items()}
+    assert rows[0]["technique"] == min(costs, key=costs.get) and rows[0]["s"] == pytest.approx(min(costs.values()))
+
+
+def test_choice_follows_the_model(monkeypatch):
+    def model(build, ray):
+        return needs.Model((np.log(build), 0.0), {("primary", c): (0.0, 0.0, 0.0, False) for c in ("n_it", "n_ts")}, (ray, 0.0, 0.0))
+    seen = needs.survey(needs._even(100))
+    monkeypatch.setitem(needs._known, "fast", ({"bvh": model(1.0, 1e-3), "grid": model(0.1, 2e-3), "kd-tree": model(50.0, 1e-5)}, 0.0))
+    assert needs.choose(seen, {"primary": 10})[0] == {"primary": "grid"}                # the build counts
+    assert needs.choose(seen, {"primary": 10**6})[0] == {"primary": "kd-tree"}          # the rays count
+    assert needs.choose(seen, {"primary": 10**6, "shadow": 10})[0] == {"primary": "kd-tree", "shadow": "kd-tree"}   # it is built anyway
+    monkeypatch.setitem(needs._known, "fast", ({"bvh": model(1.0, 1e-3), "grid": model(1.0, 0.9e-3)}, 0.0))
+    assert needs.choose(seen, {"primary": 10**6})[0] == {"primary": "bvh"}              # a gain smaller than the model's error
+
+
+@pytest.mark.parametrize("core", ["fast", "pure"])
+def test_automatic_draws_the_same_picture(core):
+    scene = scene_of((Material("mirror", mirror=0.5),))
+    fixed, free = (trace(scene, name, core, (12, 8)) for name in ("bvh", "automatic"))
+    assert np.array_equal(fixed.image, free.image)
+    assert set(free.structures) == {"primary", "secondary"}
+    chosen = trace(scene, "grid", core, (4, 4), secondary="automatic")
+    assert chosen.structures["primary"].technique.name == "grid"
+    assert chosen.structures["secondary"].technique.name in needs.calibration(core)[0]
+
+
+def test_plan_says_what_is_left_out():
+    plan = needs.plan(scene_of())
+    left = {item["what"]: item for item in plan.left_out}
+    assert {"secondary rays", "refraction", "shadow rays", "textures", "analytic primitives and Booleans", "a second level of structures"} <= set(left)
+    assert set(plan.choice) == {"primary"} and all(item["why"] and item["cost"] for item in plan.left_out)
+    other = needs.plan(scene_of((Material("glass", transmission=1.0),), objects=[Object("ball", Shapes([solids.sphere((0, 0, 3), 1.0)]))]))
+    assert not {"secondary rays", "refraction", "analytic primitives and Booleans"} & {item["what"] for item in other.left_out}
+    assert set(other.choice) == {"primary", "secondary"}
+    far = Scene.from_triangles(np.random.default_rng(0).random((9, 3)) + 1e6, np.arange(9).reshape(3, 3))
+    assert "Move it nearer" in needs.plan(far).precision and "Move" not in plan.precision
+    assert "Left out:" in needs.text(plan)
+
+
+def test_the_verb(tmp_path, capsys):
+    path = tmp_path / "scene.nff"
+    path.write_text("v\nfrom 0 0 5\nat 0 0 0\nup 0 1 0\nangle 40\nhither 1\nresolution 16 16\nf 1 0 0 1 0 0 0 1\ns 0 0 0 1\n")
+    assert main(["needs", str(path), "--size", "16x16", "--json"]) == 0
+    record = json.loads(capsys.readouterr().out)
+    assert record["plan"]["seen"]["kinds"] == {"sphere": 1} and record["plan"]["choice"]
+    assert main(["needs", str(path), "--size", "16x16"]) == 0
+    assert "primary rays:" in capsys.readouterr().out
+    assert main(["trace", str(path), "--size", "8x8", "--technique", "automatic"]) == 0
+
+
+# --- what is not needed is not imported -------------------------------------------------------------------------------
+
+SCENE = """
+import sys, time
+import numpy as np
+from rayscope.core import Camera, Light, Material, Mesh, Object, Scene, Shapes, solids, trace
+mesh = Mesh(np.random.default_rng(0).random((30, 3)), np.arange(30).reshape(-1, 3))
+camera = Camera.look_at((3.0, -3.0, 2.0), (0.0, 0.0, 0.0))
+"""
+
+
+def loaded(code):
+    """Modules of the core that a script leaves loaded."""
+    done = subprocess.run([sys.executable, "-c", SCENE + code + "\nprint(*sorted(m for m in sys.modules if m.startswith('rayscope.core.')))"],
+                          capture_output=True, text=True, check=True)
+    return {name.removeprefix("rayscope.core.") for name in done.stdout.split()}
+
+
+@pytest.mark.parametrize("core", ["fast", "pure"])
+def test_a_plain_scene_loads_nothing_else(core):
+    modules = loaded(f"r = trace(Scene([Object('mesh', mesh)], camera=camera), core='{core}', size=(4, 4))\n"
+                     "assert set(r.structures) == {'primary'} and not r.structures['primary'].primitives is None")
+    assert f"{core}.hierarchies.bvh" in modules and f"{core}.primitives.triangle" in modules
+    unneeded = {f"{core}.primitives.{name}" for name in ("solids", "sphere", "box", "cylinder", "cone", "polygon", "polytope", "pyramid", "instance")}
+    unneeded |= {f"{core}.tracing.{name}" for name in ("secondary", "optics", "lights", "shadows", "texture")}
+    unneeded |= {f"{core}.{family}" for family in ("subdivision", "directional", "generalised")} | {"peers", "lab.needs", "lab.stability"}
+    assert not unneeded & modules
+    other = "fast" if core == "pure" else "pure"
+    assert not {m for m in modules if m.startswith(other)}
+
+
+@pytest.mark.parametrize("core", ["fast", "pure"])
+@pytest.mark.parametrize("code, module", [
+    ("Scene([Object('mesh', mesh, materials=(Material(mirror=0.5),))], camera=camera)", "tracing.secondary"),
+    ("Scene([Object('ball', Shapes([solids.sphere((0, 0, 0), 1.0)]))], camera=camera)", "primitives.sphere"),
+], ids=["mirror", "sphere"])
+def test_what_is_needed_is_loaded(core, code, module):
+    """The other half: the modules whose absence is tested above are those that do the work."""
+    assert f"{core}.{module}" in loaded(f"trace({code}, core='{core}', size=(16, 16))")
+
+
+def test_import_is_quick():
+    code = "import numpy, time; t = time.process_time(); import rayscope.core; print(time.process_time() - t)"
+    times = [float(subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout) for _ in range(2)]
+    assert min(times) < 0.1
