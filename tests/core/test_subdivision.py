@@ -1,0 +1,287 @@
+"""Division of space: what its techniques owe each other, their guards, and what each one is for."""
+
+import math
+
+import numpy as np
+import pytest
+
+import rayscope.core.fast.subdivision.grid as fast_grid
+import rayscope.core.pure.subdivision.grid as pure_grid
+from rayscope.core import MemoryEstimateError, ParameterError, Scene, build, solids
+from rayscope.core.figures import PER_RAY
+from rayscope.core.fast.subdivision.lists import Lists, PairSet
+from rayscope.core.scene.scene import Object, Shapes
+
+
+def soup(n, size, seed=1, scale=1.0, offset=0.0):
+    rng = np.random.default_rng(seed)
+    corners = scale * (rng.random((n, 1, 3)) + size * rng.normal(size=(n, 3, 3))) + offset
+    return Scene.from_triangles(corners.reshape(-1, 3), np.arange(3 * n).reshape(-1, 3))
+
+
+def mixed():
+    rng = np.random.default_rng(2)
+    shapes = Shapes([solids.sphere(rng.random(3), 0.1) for _ in range(15)] + [solids.box(p, p + 0.2) for p in rng.random((5, 3))])
+    return Scene([*soup(60, 0.2).objects, Object("shapes", shapes)])
+
+
+def rays(n=250, seed=3):
+    rng = np.random.default_rng(seed)
+    o, d = 2.0 * rng.random((n, 3)) - 0.5, rng.normal(size=(n, 3))
+    d[:20, 0] = 0.0
+    d[20:40] = np.eye(3)[rng.integers(3, size=20)] * np.where(rng.random((20, 1)) < 0.5, -1.0, 1.0)
+    o[40:80] = np.round(4.0 * o[40:80]) / 4.0           # on planes, edges and corners
+    d[40:80] = np.round(2.0 * d[40:80]) + (0.0, 0.0, 1e-3)
+    return o, d
+
+
+def counts(index, o, d, **more):
+    hits = index.closest(o, d, count=True, **more)
+    return np.array([getattr(hits, name) for name in PER_RAY]), hits
+
+
+WALKS = ("root", "intervals", "links", "heap")
+#: Combinations of parameters that test_properties does not try, since it changes one at a time.
+COMBINATIONS = [
+    ("grid", dict(walk="subtract", lists="shared", mailbox=False)), ("grid", dict(walk="add", rule="regular", density=20.0)),
+    ("grid", dict(rule="heterogeneous", resolution=9)),
+    ("separated-grid", dict(axes=2, intersect="sorted", mailbox=False)), ("separated-grid", dict(axes=2, density=10.0)),
+    ("macro-grid", dict(region="cube", resolution=15)), ("macro-grid", dict(region="box", resolution=15, lists="shared")),
+    *(("octree", dict(walk=w, split="cost", leaf_size=2, lists="shared")) for w in WALKS),
+    *(("octree", dict(storage=s, leaf_size=1, max_depth=5, mailbox=False, lists=shared)) for s, shared in (("linear", "own"), ("hashed", "shared"))),
+    *(("kd-tree", dict(walk=w, split="middle", stop="depth", max_depth=9, mailbox=False)) for w in WALKS),
+    *(("kd-tree", dict(walk=w, clip=False, lists="shared")) for w in WALKS),
+    ("bsp-tree", dict(planes="slabs", directions=13, stop="cost", mailbox=False)), ("bsp-tree", dict(leaf_size=1, lists="shared")),
+]
+
+
+@pytest.mark.parametrize("name, parameters", COMBINATIONS, ids=lambda x: x if isinstance(x, str) else "-".join(f"{k}={v}" for k, v in x.items()))
+@pytest.mark.parametrize("scene", [soup(90, 0.1), mixed()], ids=["soup", "mixed"])
+def test_both_cores_do_the_same(scene, name, parameters):
+    """The same hits, the same cells, the same counts for every single ray."""
+    o, d = rays()
+    fast, pure = build(scene, name, **parameters), build(scene, name, core="pure", **parameters)
+    for figure in ("N_G", "N_E", "N_EE", "N_ER", "depth", "N_L", "collisions"):
+        assert fast.figures.get(figure) == pure.figures.get(figure), figure
+    (ours, hits), (theirs, _) = counts(fast, o, d), counts(pure, o, d)
+    assert np.array_equal(ours, theirs)
+    truth = build(scene, "brute").closest(o, d)
+    assert np.array_equal(hits.t, truth.t) and np.array_equal(hits.primitive, truth.primitive)
+    assert 20 < (truth.primitive >= 0).sum() < len(o)
+    blocked, ours = fast.occluded(o, d, t_max=0.5, count=True)
+    expected, theirs = pure.occluded(o, d, t_max=0.5, count=True)
+    assert np.array_equal(blocked, expected) and all(np.array_equal(ours[k], theirs[k]) for k in PER_RAY)
+
+
+@pytest.mark.parametrize("name", ["octree", "kd-tree"])
+@pytest.mark.parametrize("mailbox", [True, False])
+def test_four_walks_visit_the_same_leaves(name, mailbox):
+    scene, (o, d) = soup(400, 0.05), rays(1000)
+    found = {walk: counts(build(scene, name, walk=walk, mailbox=mailbox), o, d) for walk in WALKS}
+    n_it, n_ts, n_ets, n_eets = found["root"][0]
+    for walk, (own, hits) in found.items():
+        assert np.array_equal(own[0], n_it) and np.array_equal(hits.t, found["root"][1].t), walk
+        assert np.array_equal(own[2], n_ets) and np.array_equal(own[3], n_eets), walk
+    steps = {walk: own[1].sum() for walk, (own, _) in found.items()}
+    assert steps["links"] < steps["heap"] < steps["root"] and steps["heap"] < steps["intervals"]
+
+
+@pytest.mark.parametrize("storage", ["linear", "hashed"])
+def test_storages_are_the_same_tree(storage):
+    scene, (o, d) = soup(400, 0.05), rays()
+    pointers, other = build(scene, "octree", leaf_size=2), build(scene, "octree", leaf_size=2, storage=storage)
+    a, b = counts(pointers, o, d)[0], counts(other, o, d)[0]
+    assert np.array_equal(a[[0, 2, 3]], b[[0, 2, 3]])
+    assert np.array_equal(a[1], b[1]) if storage == "hashed" else (b[1] == b[2]).all()
+    mine, theirs = (np.sort(np.concatenate([c.lo, c.hi], axis=1)[c.leaf], axis=0) for c in (pointers.cells(), other.cells()))
+    assert np.array_equal(mine, theirs)
+    assert other.figures["memory"] < pointers.figures["memory"]
+    if storage == "hashed":
+        assert 0.5 < other.figures["load_factor"] < 1.0
+        # A third of the entries collides at three quarters full, if names are spread well: n - size (1 - (1 - 1/size)^n).
+        n, size = other.figures["N_E"], other.figures["N_E"] / other.figures["load_factor"]
+        assert other.figures["collisions"] < 1.5 * (n - size * (1.0 - math.exp(-n / size)))
+
+
+@pytest.mark.parametrize("core", ["fast", "pure"])
+@pytest.mark.parametrize("more", [dict(walk="links"), dict(split="cost")])
+def test_leaves_without_pointers_refuse_what_needs_them(core, more):
+    with pytest.raises(ParameterError, match="walk = root"):
+        build(soup(5, 0.1), "octree", core=core, storage="hashed", **more)
+
+
+@pytest.mark.parametrize("core", ["fast", "pure"])
+@pytest.mark.parametrize("name", ["octree", "kd-tree", "bsp-tree"])
+def test_memory_given_is_kept(name, core):
+    scene = soup(500 if core == "fast" else 100, 0.05)
+    used = []
+    for limit in (2e4, 5e4, 1.2e5):
+        index = build(scene, name, core=core, stop="memory", max_bytes=limit, leaf_size=1)
+        used.append(index.figures["memory"])
+        # One cell more at most: its children, and what is in them twice.
+        cell = 8 * 500 + 8 * (8 if core == "fast" else 40) * scene.n_primitives
+        assert limit <= used[-1] <= limit + cell
+    assert used == sorted(used)
+
+
+@pytest.mark.parametrize("name", ["octree", "kd-tree"])
+def test_memory_goes_where_rays_test_most(name):
+    """More memory, fewer tests; and the queue is better than stopping at a level with as many cells."""
+    scene, (o, d) = soup(600, 0.03), rays(1000)
+    tests = [counts(build(scene, name, stop="memory", max_bytes=b, leaf_size=1, mailbox=False), o, d)[0][0].sum() for b in (1e4, 4e4, 1.6e5)]
+    assert tests[0] > 1.5 * tests[1] > 2.0 * tests[2]
+
+
+@pytest.mark.parametrize("core", ["fast", "pure"])
+@pytest.mark.parametrize("name", ["octree", "kd-tree", "bsp-tree"])
+def test_growth_without_end_is_stopped(name, core):
+    """Primitives that all overlap are in every cell, however small."""
+    n = 200
+    scene = Scene([Object("onion", Shapes([solids.box((-1, -1, -1 - k / n), (1, 1, 1)) for k in range(n)]))])
+    extra = dict(split="middle", stop="depth", max_depth=40) if name == "kd-tree" else dict(max_depth=18)
+    if name == "bsp-tree":
+        extra["planes"] = "slabs"
+    index = build(scene, name, core=core, leaf_size=1, **extra)
+    assert index.figures["N_ER"] <= 2 * 8 * 12_800
+    if name != "bsp-tree":
+        assert [x for x in index.notices if "references" in str(x) and "level" in str(x)], index.notices
+
+
+@pytest.mark.parametrize("module, core", [(fast_grid, "fast"), (pure_grid, "pure")])
+@pytest.mark.parametrize("name", ["grid", "macro-grid"])
+def test_grid_too_large_is_refused_before_allocation(module, core, name, monkeypatch):
+    monkeypatch.setattr(module, "free_memory", lambda: 1e6)
+    scene = soup(50, 0.1)
+    with pytest.raises(MemoryEstimateError, match="Set resolution to") as refusal:
+        build(scene, name, core=core, resolution=4000)
+    fits = int(str(refusal.value).split("Set resolution to ")[1].split()[0])
+    assert 2 < fits < 40
+    index = build(scene, name, core=core, resolution=fits)
+    assert 0.5 * 1e6 / (24 if core == "fast" else 32) >= index.figures["N_E"] > 0.2 * 1e6 / 32
+
+
+def test_mailbox_saves_tests_and_nothing_else():
+    scene, (o, d) = soup(60, 0.5), rays()
+    for name in ("grid", "octree", "kd-tree", "bsp-tree", "separated-grid"):
+        a, b = (counts(build(scene, name, mailbox=m), o, d) for m in (True, False))
+        assert a[0][0].sum() < b[0][0].sum() and (a[0][0] <= b[0][0]).all()
+        assert np.array_equal(a[0][1:], b[0][1:]) and np.array_equal(a[1].t, b[1].t)
+        assert (a[0][0] <= scene.n_primitives).all()
+
+
+def test_a_hit_outside_the_current_cell_is_put_by():
+    """A long triangle is met in the first cell, behind a small one that is listed in the second cell alone."""
+    long = [(-1.0, -10.0, -10.0), (9.0, 30.0, 10.0), (9.0, -10.0, 10.0)]
+    small = [(5.0, -1.0, -1.0), (5.0, 2.0, -1.0), (5.0, -1.0, 2.0)]
+    scene = Scene.from_triangles(long + small, [(0, 1, 2), (3, 4, 5)])
+    o, d = [(-9.0, 0.1, 0.2)], [(1.0, 0.0, 0.02)]
+    truth = build(scene, "brute").closest(o, d)
+    for core in ("fast", "pure"):
+        hits = build(scene, "grid", core=core, resolution=16).closest(o, d, count=True)
+        assert hits.t[0] == truth.t[0] and hits.primitive[0] == truth.primitive[0]
+
+
+def test_shared_lists_are_walked_once():
+    scene, (o, d) = soup(8, 0.6), rays()
+    own, shared = (build(scene, "grid", resolution=16, lists=k, mailbox=False) for k in ("own", "shared"))
+    assert shared.figures["N_L"] < 0.5 * (shared.figures["N_E"] - shared.figures["N_EE"])
+    assert shared.figures["memory"] < own.figures["memory"]
+    a, b = counts(own, o, d)[0].sum(axis=1), counts(shared, o, d)[0].sum(axis=1)
+    assert b[0] < 0.7 * a[0] and b[1] == a[1] and b[2] < 0.7 * a[2]
+
+
+def test_lists_that_only_look_alike_are_not_shared(monkeypatch):
+    """Even if all sums of hashes collide."""
+    import rayscope.core.fast.subdivision.lists as module
+    monkeypatch.setattr(module, "scrambled", lambda keys: keys & np.uint64(0))
+    lists = Lists(np.array([0, 0, 1, 1, 3, 3]), np.array([1, 2, 1, 3, 1, 2]), 4, shared=True)
+    got = []
+    for cell in range(4):
+        _, first, count = lists.of(np.array([cell]))
+        got.append(lists.items[first[0]:first[0] + count[0]].tolist())
+    assert got == [[1, 2], [1, 3], [], [1, 2]]
+    assert lists.list_of[0] == lists.list_of[3] != lists.list_of[1] and lists.list_of[2] == 0
+
+
+def test_pair_set():
+    rng = np.random.default_rng(0)
+    own, known = PairSet(), set()
+    for _ in range(30):
+        keys = np.unique(rng.integers(0, 40_000, size=3000)).astype(np.uint64)
+        rng.shuffle(keys)
+        expected = [k for k, key in enumerate(keys.tolist()) if key not in known]
+        assert own.add(keys).tolist() == expected
+        known.update(keys.tolist())
+
+
+def test_macro_regions_save_steps_and_cost_memory():
+    scene, (o, d) = soup(40, 0.02), rays()
+    plain, cube, box = (build(scene, "grid", resolution=40), build(scene, "macro-grid", resolution=40),
+                        build(scene, "macro-grid", resolution=40, region="box"))
+    a, b, c = (counts(x, o, d)[0].sum(axis=1) for x in (plain, cube, box))
+    assert a[0] == b[0] == c[0]
+    assert c[1] < b[1] < 0.5 * a[1]
+    cells = plain.figures["N_E"]
+    assert cube.figures["memory"] == plain.figures["memory"] + cells and box.figures["memory"] == plain.figures["memory"] + 6 * cells
+
+
+def test_macro_regions_are_chessboard_distances():
+    index = build(soup(30, 0.03), "macro-grid", resolution=20)
+    filled = np.argwhere((index.lists.count > 0).reshape(index.resolution))
+    for cell in np.flatnonzero(index.lists.count == 0)[::37]:
+        distance = np.abs(filled - index._indices(np.array([cell])).T).max(axis=1).min()
+        assert index.reach[0, cell] == distance - 1
+
+
+@pytest.mark.parametrize("axes", [2, 3])
+def test_separated_lists_lose_nothing_and_test_more(axes):
+    scene, (o, d) = soup(80, 0.3), rays()
+    index = build(scene, "separated-grid", axes=axes, resolution=8)
+    exact = build(scene, "grid", resolution=8)
+    if axes == 3:
+        cells = np.arange(len(exact.lists.count))
+        items, length = index.candidates(cells)
+        first = np.cumsum(length) - length
+        for cell in cells:
+            _, begin, count = exact.lists.of(np.array([cell]))
+            mine = set(items[first[cell]:first[cell] + length[cell]].tolist())
+            assert mine >= set(exact.lists.items[begin[0]:begin[0] + count[0]].tolist())
+    assert counts(index, o, d)[0][0].sum() > counts(exact, o, d)[0][0].sum()
+
+
+@pytest.mark.parametrize("scale", [1e-6, 1.0, 1e6])
+@pytest.mark.parametrize("name, parameters", [("grid", {}), ("macro-grid", {}), ("octree", dict(storage="hashed", leaf_size=1)), ("octree", dict(walk="links", leaf_size=1)),
+                                              ("kd-tree", {}), ("bsp-tree", {})], ids=str)
+def test_through_edges_and_corners_of_cells(name, parameters, scale):
+    """Rays along the diagonals of a lattice of small triangles, whose points are corners of cells."""
+    k = np.stack(np.meshgrid(*[np.arange(5.0)] * 3, indexing="ij"), axis=-1).reshape(-1, 1, 3)
+    small = np.array([(0.05, 0, 0), (0, 0.05, 0), (0, 0, 0.05)]) - 0.05 / 3
+    scene = Scene.from_triangles(scale * (k + small).reshape(-1, 3), np.arange(3 * len(k)).reshape(-1, 3))
+    steps = np.array([(x, y, z) for x in (-1, 0, 1) for y in (-1, 0, 1) for z in (-1, 0, 1) if x or y or z], float)
+    o = np.concatenate([(2.0 - 5.0 * steps), (2.0 - steps / 2), np.repeat([[2.0, 2.0, 2.0]], len(steps), 0)]) * scale
+    d = np.tile(steps, (3, 1))
+    index, truth = build(scene, name, **parameters), build(scene, "brute").closest(o, d)
+    hits = index.closest(o, d)
+    assert np.array_equal(hits.t, truth.t) and np.array_equal(hits.primitive, truth.primitive)
+    assert truth.hit.sum() >= len(steps)
+
+
+@pytest.mark.parametrize("name", ["grid", "macro-grid", "separated-grid", "octree", "kd-tree", "bsp-tree"])
+@pytest.mark.parametrize("core", ["fast", "pure"])
+def test_rays_from_very_far_away_are_traced_by_brute_force(name, core):
+    scene = soup(20, 0.2)
+    d = np.random.default_rng(0).normal(size=(30, 3))
+    o = 0.5 - 1e14 * d
+    truth, hits = build(scene, "brute").closest(o, d), build(scene, name, core=core).closest(o, d, count=True)
+    assert np.array_equal(np.asarray(hits.t), truth.t) and truth.hit.any()
+
+
+def test_surface_area_heuristic_pays():
+    rng = np.random.default_rng(4)
+    corners = np.concatenate([rng.random((200, 1, 3)) * 0.05 + 0.002 * rng.normal(size=(200, 3, 3)), 5.0 * rng.random((4, 1, 3)) + 0.1 * rng.normal(size=(4, 3, 3))])
+    scene = Scene.from_triangles(corners.reshape(-1, 3), np.arange(3 * len(corners)).reshape(-1, 3))
+    middle, sah = (build(scene, "kd-tree", **more).figures["c_SAH"] for more in (dict(split="middle", stop="depth"), {}))
+    assert sah < 0.8 * middle
+    large = soup(300, 0.15)
+    loose, clipped = (build(large, "kd-tree", clip=clip).figures["c_SAH"] for clip in (False, True))
+    assert clipped < 0.9 * loose
