@@ -29,7 +29,7 @@ class Cube:
             for sign in (1.0, -1.0):
                 forward, right, up = sign * np.eye(3)[axis], np.eye(3)[(axis + 1) % 3], np.eye(3)[(axis + 2) % 3]
                 self.views.append(View(self.position, right, up, forward, extra=extra))
-        self.faces = {}
+        self.faces, self._boxes = {}, None
 
     @property
     def nbytes(self):
@@ -38,8 +38,20 @@ class Cube:
     def face(self, number):
         """The lists of one face: 0 to 5 are +x, -x, +y, -y, +z, -z."""
         if number not in self.faces:
-            self.faces[number] = Lists(self.views[number], self.primitives, self.resolution, self.most_bytes)
+            which = np.flatnonzero(self._may_show(number))
+            self.faces[number] = Lists(self.views[number], self.primitives, self.resolution, self.most_bytes, which)
         return self.faces[number]
+
+    def _may_show(self, number):
+        """Bool per primitive: whether its box reaches into the pyramid of a face."""
+        if self._boxes is None:
+            lo, hi = ((b - self.position).T for b in (self.primitives.lo, self.primitives.hi))
+            # Farthest along each axis, either way; and least distance from the plane across the centre.
+            self._boxes = hi, -lo, np.maximum(np.maximum(lo, -hi), 0.0)
+        axis, back = divmod(number, 2)
+        size = 1.02 * self._boxes[back][axis] + 2.0**-40 * self.views[number].extra
+        beside = self._boxes[2]
+        return ~((size < 0.0) | (beside[(axis + 1) % 3] > size) | (beside[(axis + 2) % 3] > size))
 
     @staticmethod
     def through(w):

@@ -37,9 +37,9 @@ class Lists:
         Numbers of footprints, ascending in each cell.
     """
 
-    def __init__(self, view, primitives, resolution=0, most_bytes=np.inf):
+    def __init__(self, view, primitives, resolution=0, most_bytes=np.inf, which=None):
         self.view = view
-        self.feet = feet = Footprints.of(view, primitives)
+        self.feet = feet = Footprints.of(view, primitives, which=which)
         self.grid, self.entry = None, np.zeros(0, np.int32)
         if not len(feet):
             return

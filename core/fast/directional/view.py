@@ -133,19 +133,23 @@ class Footprints:
         return Footprints(*(getattr(self, f.name).take(index) for f in fields(self)))
 
     @classmethod
-    def of(cls, view, primitives, progress=lambda fraction: None):
-        """The footprints of all primitives that the window shows, nearest first."""
-        parts = []
-        for kind, start in zip(primitives.kinds, primitives.starts):
-            for first in range(0, kind.n, CHUNK):
-                part = slice(first, min(first + CHUNK, kind.n))
+    def of(cls, view, primitives, progress=lambda fraction: None, which=None):
+        """The footprints of the primitives that the window shows, nearest first.
+
+        `which` are the numbers, ascending, of those that it might show; without it any might.
+        """
+        which, parts = np.arange(primitives.n) if which is None else which, []
+        ends = np.searchsorted(which, primitives.starts)
+        for kind, start, begin, end in zip(primitives.kinds, primitives.starts, ends, ends[1:]):
+            for first in range(begin, end, CHUNK):
+                item = which[first:min(first + CHUNK, end)]
                 if hasattr(kind, "hull"):
-                    hull = kind.hull(part)
+                    hull = kind.hull(item - start)
                 else:
-                    lo, hi = (b[start + part.start:start + part.stop].T for b in (primitives.lo, primitives.hi))
+                    lo, hi = (b[item].T for b in (primitives.lo, primitives.hi))
                     hull = np.stack([np.where(np.array([[k & 1], [k >> 1 & 1], [k >> 2]]), hi, lo) for k in range(8)], axis=1)
-                parts.append(_of_hulls(view, hull, start + part.start))
-                progress((start + part.stop) / primitives.n)
+                parts.append(_of_hulls(view, hull, item))
+                progress((first + len(item)) / primitives.n)
         if not parts:
             return cls(np.zeros(0, np.int64), *(np.zeros(0, np.float32) for _ in fields(cls)[1:]))
         columns = [np.concatenate(c) for c in zip(*parts)]
@@ -153,12 +157,11 @@ class Footprints:
         return cls(*(c.take(order) for c in columns))
 
 
-def _of_hulls(view, hull, first):
+def _of_hulls(view, hull, item):
     """Columns of the footprints of the convex hulls of points, shape (3, k, m); those that the window does not show are left out."""
     with np.errstate(all="ignore"):
         x, y, z, away = view.points(hull)
         e = ROUNDING * view.scale * (away.max(axis=0) + view.extra)
-        item = np.arange(first, first + x.shape[1])
         if view.perspective:
             # Beyond one of the window's four sides, or behind the eye? NaN says no.
             out = (z < -e).all(axis=0)

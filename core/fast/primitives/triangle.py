@@ -68,9 +68,9 @@ class Triangles:
         a, b, c = self.xyz[0:3], self.xyz[3:6], self.xyz[6:9]
         return np.minimum(np.minimum(a, b), c).T, np.maximum(np.maximum(a, b), c).T
 
-    def hull(self, part):
-        """The corners of a slice of the triangles, shape (3, 3, m)."""
-        return self.xyz[:, part].reshape(3, 3, -1).transpose(1, 0, 2)
+    def hull(self, item):
+        """The corners of some triangles, shape (3, 3, m)."""
+        return np.stack(self.rows(item)).reshape(3, 3, -1).transpose(1, 0, 2)
 
     def intersect(self, rays, ray, item, t_far):
         """Nearest hits of pairs; see the package's interface."""
