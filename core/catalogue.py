@@ -82,9 +82,13 @@ MAX_BYTES = Parameter("max_bytes", 64e6, "With stop = memory: cells are divided 
 WALK = Parameter("walk", "depth-first", "Which of the nodes that wait a ray enters next: the nearest child; the nearest of all, from a heap",
                  choices=("depth-first", "best-first"))
 
+OTHER_TESTS = ("moller-trumbore", "badouel", "baldwin-weber", "plucker")
+
 TECHNIQUES = (
     Technique("brute", "Brute Force", "hierarchies", "brute", "Brute",
-              "Whitted 1980", "Every ray is tested against every primitive"),
+              "Whitted 1980", "Every ray is tested against every primitive",
+              parameters=(Parameter("triangle_test", "watertight", "How a ray is tested against a triangle; all but the watertight one lose rays at edges",
+                                    choices=("watertight", *OTHER_TESTS), inexact=OTHER_TESTS),)),
     Technique("bvh", "Bounding Volume Hierarchy", "hierarchies", "bvh", "BVH",
               "Goldsmith and Salmon 1987; Wald 2007; Meister and Bittner 2018",
               "A tree of axis-aligned boxes around the primitives",

@@ -31,6 +31,9 @@ class Parameter:
         Unit of the value, ``""`` for a pure number.
     only : dict, optional
         ``{choice: core}`` for choices that one core alone offers.
+    inexact : tuple of str, optional
+        Choices that are there to show what they get wrong: their hits may differ from the default's by rounding, and near edges
+        by more. All others promise the same hits.
     """
 
     name: str
@@ -41,6 +44,7 @@ class Parameter:
     high: float | None = None
     unit: str = ""
     only: tuple = ()
+    inexact: tuple = ()
 
     def default_in(self, core):
         """The default in one core."""

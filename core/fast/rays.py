@@ -81,6 +81,12 @@ class Rays:
             return 1.0 / self.d
 
     @cached_property
+    def moment(self):
+        """o x d, shape (3, n); with d, the Plücker coordinates of the rays' lines."""
+        o, d = self.o, self.d
+        return np.stack([o[1] * d[2] - o[2] * d[1], o[2] * d[0] - o[0] * d[2], o[0] * d[1] - o[1] * d[0]])
+
+    @cached_property
     def main(self):
         """The axes kx, ky, kz of :attr:`shear` where they are the same for all rays, else None."""
         if not self.n:

@@ -49,12 +49,13 @@ class Ray:
         outside the primitive's box, so boxes are met with this much to spare.
     """
 
-    __slots__ = ("usable", "o", "d", "t_min", "t_max", "exponent", "inverse", "axes", "shear", "slack")
+    __slots__ = ("usable", "o", "d", "t_min", "t_max", "exponent", "inverse", "axes", "shear", "slack", "_moment")
 
     def __init__(self, origin, direction, t_min=0.0, t_max=math.inf):
         ox, oy, oz = (float(x) for x in origin)
         dx, dy, dz = (float(x) for x in direction)
         largest = max(abs(dx), abs(dy), abs(dz))
+        self._moment = None
         self.usable = (all(map(math.isfinite, (ox, oy, oz, dx, dy, dz))) and largest > 0.0 and t_min <= t_max)
         if not self.usable:
             return
@@ -71,6 +72,14 @@ class Ray:
             kx, ky = ky, kx
         self.axes = (kx, ky, kz)
         self.shear = (d[kx] / d[kz], d[ky] / d[kz], 1.0 / d[kz])
+
+    @property
+    def moment(self):
+        """o x d; with d, the Plücker coordinates of the ray's line."""
+        if self._moment is None:
+            (ox, oy, oz), (dx, dy, dz) = self.o, self.d
+            self._moment = (oy * dz - oz * dy, oz * dx - ox * dz, ox * dy - oy * dx)
+        return self._moment
 
     def callers_t(self, t):
         """t in multiples of the caller's direction."""

@@ -3,6 +3,7 @@
 import numpy as np
 
 from ...hits import Cells
+from ..primitives.triangle_tests import Tested, tested
 from ..structure import Structure
 
 #: Pairs tested at a time.
@@ -12,8 +13,10 @@ PAIRS = 131_072
 class Brute(Structure):
     """No structure at all."""
 
-    def build(self, progress):
-        """Nothing to build."""
+    def build(self, progress, triangle_test="watertight"):
+        """Nothing to build but what the triangles' test wants prepared."""
+        self.primitives.kinds = tested(self.primitives.kinds, triangle_test)
+        self.figures["memory"] = sum(row.nbytes for k in self.primitives.kinds if isinstance(k, Tested) for row in k.data)
         self.figures.update(N_G=0, N_E=1, N_EE=0, N_ER=self.primitives.n, depth=0)
 
     def traverse(self, rays, query):
