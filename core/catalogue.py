@@ -190,6 +190,13 @@ TECHNIQUES = (
     Technique("image-directory", "Image Directory", "directional", "image_directory", "ImageDirectory",
               "Weghorst, Hooper and Greenberg 1984",
               "What primary rays can meet is listed in the image plane beforehand; other rays are handed to a bvh", rays=("primary",)),
+    Technique("light-buffer", "Light Buffer", "directional", "light_buffer", "LightBuffer",
+              "Haines and Greenberg 1986",
+              "Around each light, lists of what is seen in each direction; other rays are handed to a bvh", rays=("shadow",),
+              parameters=(
+                  Parameter("resolution", 0, "Cells along an edge of the direction cube; 0 means by the number of primitives", low=0, high=4096),
+                  Parameter("max_bytes", 256e6, "Above it the buffers of lights not used for longest are given up", low=1e3, high=1e12, unit="bytes"),
+              )),
     Technique("embree", "Embree", "peers", "embree", "Embree",
               "Wald et al. 2014", "Intel's ray tracing kernels, through the package embreex",
               primitives="triangle", cores=("fast",)),

@@ -60,9 +60,15 @@ def same(got, expected):
         assert np.array_equal(a, b), (field, np.flatnonzero(a != b)[:5], a[a != b][:5], b[a != b][:5])
 
 
+def in_turn(kinds, each):
+    """Every data set with some of the kinds; all kinds occur."""
+    kinds = list(kinds)
+    return [pytest.param(name, kinds[(3 * k + i) % len(kinds)], id=f"{name}-{kinds[(3 * k + i) % len(kinds)]}")
+            for k, name in enumerate(BY_NAME) for i in range(each)]
+
+
 @pytest.mark.parametrize("core", CORES)
-@pytest.mark.parametrize("view", CAMERAS)
-@pytest.mark.parametrize("name", BY_NAME)
+@pytest.mark.parametrize("name, view", in_turn(CAMERAS, 3))
 def test_camera_rays(name, view, core):
     scene, index, brute = viewed(name, view, core)
     size = (23, 17) if core == "fast" else (9, 7)
@@ -79,7 +85,7 @@ def test_camera_rays(name, view, core):
 
 @pytest.mark.parametrize("core", CORES)
 @pytest.mark.parametrize("name", BY_NAME)
-@pytest.mark.parametrize("technique", ["image-directory"])
+@pytest.mark.parametrize("technique", ["image-directory", "light-buffer"])
 def test_all_other_rays(name, core, technique):
     scene, index, _ = viewed(name, "in front", core, technique)
     rays = scene_of(name)[1]
@@ -162,3 +168,98 @@ def test_deep_scenes_hide_what_is_behind(size, monkeypatch):
     hits = index.closest(o, d, count=True)
     same(hits, brute.closest(o, d))
     assert hits.n_it.mean() < 3.0
+
+
+LIGHTS = {
+    "outside": Light("outside", "point", (1.0,) * 3),
+    "inside": Light("inside", "spot", (1.0,) * 3),
+    "on a vertex": Light("on a vertex", "point", (1.0,) * 3),
+    "on a surface": Light("on a surface", "point", (1.0,) * 3),
+    "sun": Light("sun", "sun", (1.0,) * 3, direction=(0.3, -0.4, -1.7)),
+    "sun along an axis": Light("sun along an axis", "sun", (1.0,) * 3, direction=(0.0, -0.0, -1.0)),
+    "lamp": Light("lamp", "area", (1.0,) * 3, axes=((0.1, 0, 0), (0, 0.1, 0))),
+}
+
+
+@functools.cache
+def lit(name, kind, core):
+    """A data set with a light, a light buffer over it, brute force, and rays to the light."""
+    scene = scene_of(name)[0]
+    rng = np.random.default_rng([5, *name.encode(), *kind.encode()])
+    points = points_of(scene)
+    lo, hi = points.min(axis=0), points.max(axis=0)
+    size = float((hi - lo).max()) or 1.0
+    place = {"outside": 0.5 * (lo + hi) + 1.5 * size * rng.normal(size=3), "inside": lo + rng.random(3) * (hi - lo),
+             "on a vertex": points[rng.integers(len(points))], "on a surface": points[:3].mean(axis=0)}.get(kind, lo)
+    light = Light(**{**LIGHTS[kind].__dict__, "position": tuple(place.tolist())})
+    scene = Scene(scene.objects, [light])
+    o = np.concatenate([lo + rng.random((60, 3)) * (hi - lo), points[rng.integers(len(points), size=20)],
+                        0.5 * (lo + hi) + 1.5 * size * rng.normal(size=(20, 3)), place + size * DIAGONALS])
+    if light.kind == "sun":
+        d = np.broadcast_to(-np.array(light.direction) / np.linalg.norm(light.direction), o.shape)
+    else:
+        d = np.array(light.position) - o
+    with pytest.MonkeyPatch.context() as patch:
+        if BY_NAME[name].instanced:
+            from rayscope.core.scene.layout import Layout
+            patch.setattr(Layout, "of", functools.partial(Layout.of, copies_at_most=0))
+        return light, build(scene, "light-buffer", core), build(scene, "brute", core), o, d
+
+
+#: Through edges and corners of the direction cube, and along its axes.
+DIAGONALS = np.array([(x, y, z) for x in (-1, 0, 1) for y in (-1, 0, 1) for z in (-1, 0, 1) if x or y or z], float)
+
+
+@pytest.mark.parametrize("core", CORES)
+@pytest.mark.parametrize("name, kind", in_turn(LIGHTS, 3))
+def test_shadow_rays(name, kind, core):
+    light, index, brute, o, d = lit(name, kind, core)
+    far = math.inf if light.kind == "sun" else 1.0 - 1e-12
+    towards = index.for_light(light)
+    for t_min, t_max in ((0.0, far), (0.0, 0.4), (0.5, far)):
+        expected = np.asarray(brute.occluded(o, d, t_min, t_max))
+        assert np.array_equal(towards.occluded(o, d, t_min, t_max), expected)
+        assert np.array_equal(index.occluded(o, d, t_min, t_max), expected)
+        same(towards.closest(o, d, t_min, t_max), brute.closest(o, d, t_min, t_max))
+    # Beyond the light, and past it.
+    assert np.array_equal(towards.occluded(o, d, 0.0, 5.0), brute.occluded(o, d, 0.0, 5.0))
+    beside = d + 1e-3 * np.linalg.norm(d, axis=1, keepdims=True)
+    assert np.array_equal(towards.occluded(o, beside, 0.0, far), brute.occluded(o, beside, 0.0, far))
+
+
+@pytest.mark.parametrize("core", CORES)
+@pytest.mark.parametrize("max_bytes, resolution", [(1e3, 0), (1e5, 64), (256e6, 1)])
+def test_light_buffers_within_limits(core, max_bytes, resolution):
+    """Thousands of lights, of which few have room."""
+    scene = jittered_sphere(np.random.default_rng(0))
+    rng = np.random.default_rng(1)
+    n = 2000 if core == "fast" else 300
+    scene.lights = [Light(f"light {k}", "point", (1.0,) * 3, position=tuple(2.0 * rng.normal(size=3))) for k in range(n)]
+    index = build(scene, "light-buffer", core, max_bytes=max_bytes, resolution=resolution)
+    brute = build(scene, "brute", core)
+    for light in scene.lights[:: n // 6]:
+        o = rng.uniform(-1.2, 1.2, (30, 3))
+        d = np.array(light.position) - o
+        assert np.array_equal(index.for_light(light).occluded(o, d, t_max=1.0 - 1e-12), brute.occluded(o, d, t_max=1.0 - 1e-12))
+    if max_bytes == 1e3:
+        assert len(index.buffers) == 1 and any("max_bytes" in str(notice) for notice in index.notices)
+    assert index._second is None or core == "pure"
+
+
+@pytest.mark.parametrize("core", CORES)
+def test_pictures_with_directional_techniques_are_those_of_the_bvh(core):
+    from rayscope.core import trace
+    rng = np.random.default_rng(0)
+    scene = jittered_sphere(rng, rows=8)
+    scene.objects.append(Object("shapes", Shapes([solids.box((-3, -3, -1.2), (3, 3, -1.1)), solids.sphere((1.2, 0.5, 0.0), 0.5)])))
+    scene.camera = Camera.look_at((0.5, -5.0, 1.5), (0.0, 0.0, 0.0))
+    scene.lights = [Light("a", "point", (200.0,) * 3, position=(2.0, -2.0, 4.0)), Light("b", "sun", (1.0,) * 3, direction=(1.0, 1.0, -1.0)),
+                    Light("c", "spot", (200.0,) * 3, position=(-2.0, -1.0, 3.0), direction=(0.5, 0.25, -0.8), radius=0.2)]
+    size = (40, 30) if core == "fast" else (14, 10)
+    for samples in (1, 2):
+        plain = trace(scene, core=core, size=size, samples=samples)
+        ours = trace(scene, core=core, size=size, samples=samples, primary="image-directory", shadow="light-buffer")
+        assert np.array_equal(plain.image, ours.image)
+        for name in ("object_index", "primitive_index", "depth"):
+            assert np.array_equal(plain.passes[name], ours.passes[name])
+        assert ours.figures["shadow"]["technique"] == "light-buffer" and ours.figures["shadow"]["rays"] == plain.figures["shadow"]["rays"]

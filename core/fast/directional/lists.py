@@ -53,7 +53,7 @@ class Lists:
             along = [np.clip(np.sqrt(cells * a / b), 1, MOST_ALONG) for a, b in ((wide, high), (high, wide))]
         while True:
             self.grid = Grid.over(int(along[0]), int(along[1]), u_lo, u_lo + wide, v_lo, v_lo + high)
-            if self._fill(most_bytes) or max(along) <= 1:
+            if self._fill(most_bytes):
                 return
             along = [max(1, a // 2) for a in along]
 
@@ -61,7 +61,8 @@ class Lists:
         """List everything; False when that takes more than `most_bytes`."""
         grid, keys, n = self.grid, [], 0
         cells = grid.columns * grid.rows
-        room = (most_bytes - self.feet.nbytes - 8 * (cells + 1)) / 4
+        # One cell must do, whatever it takes.
+        room = (most_bytes - self.feet.nbytes - 8 * (cells + 1)) / 4 if cells > 1 else np.inf
         for foot, cell in spans(self.feet, grid):
             keys.append(cell.astype(np.uint64) << np.uint64(32) | foot.astype(np.uint64))
             n += len(foot)

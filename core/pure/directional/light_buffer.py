@@ -1,0 +1,180 @@
+"""The light buffer (Haines and Greenberg 1986): a direction cube in every light, for the shadow rays that go there.
+
+A shadow ray need only be tested against what is listed in the cell through which the light sees its origin, as far as
+that origin; a list ends at a primitive that covers the whole cell, the full occluder. The sun has one parallel window.
+Rays that go to no light, to a light with an extent, or beyond their light are handed over.
+"""
+
+import math
+
+from ...errors import Notice
+from ..query import Occluded
+from ..structure import Structure, memory_of
+from .cube import Cube
+from .quadtree import divide
+from .second import Handing
+from .view import LOSS, View, cross
+
+#: How far beside a light a ray may pass, relative to the largest coordinate; well within the footprints' own rounding.
+BESIDE = 2.0**-46
+#: A ray whose light is not told is compared with so many lights.
+LIGHTS_TRIED = 16
+
+
+class LightBuffer(Handing):
+    """A buffer for each light, made when its first shadow ray comes.
+
+    Attributes
+    ----------
+    buffers : dict
+        Light's number -> buffer, the most recently used last.
+    """
+
+    def build(self, progress, resolution, max_bytes):
+        self.max_depth = math.ceil(math.log2(resolution)) if resolution else 8
+        self.max_bytes, self.buffers, self.bytes = max_bytes, {}, {}
+        self.extra = 2.0 * max(abs(c) for p in self.primitives for c in (*p.lo, *p.hi))
+        self.lights = [light for light in getattr(self.scene, "lights", ()) if _fits(light)]
+        if not self.lights:
+            self.notices.append(self.needs("a point, spot or sun light", "Add one, or name another technique for shadow rays."))
+
+    def for_light(self, light):
+        """The structure for shadow rays to one light."""
+        number = next((k for k, own in enumerate(self.lights if self.primitives else ()) if own is light), None)
+        return self if number is None else OneLight(self, number)
+
+    def walk(self, query):
+        if not any(self.serve(number, query) for number in range(min(len(self.lights), LIGHTS_TRIED))):
+            self.hand_over(query)
+
+    def serve(self, number, query):
+        """Answer if the ray goes to a light; whether it does."""
+        buffer = self.buffers.get(number)
+        if buffer is None:
+            light = self.lights[number]
+            buffer = (_Sun if light.kind == "sun" else _Point)(light, self.primitives, self.extra, self.max_depth)
+        place = buffer.place(query.ray)
+        if place is None:
+            return False
+        # The most recently used comes last.
+        self.buffers.pop(number, None)
+        self.buffers[number] = buffer
+        parts = buffer.parts
+        cell, nearness, blocked_from = buffer.cell(place, query.ray)
+        if buffer.parts != parts:
+            self._make_room(number)
+        if cell.covered >= 0 and (not isinstance(query, Occluded) or blocked_from < cell.entries[0][0]):
+            # What lies behind the full occluder is not listed, but may count.
+            return False
+        if query.watch:
+            query.watch.cell(cell.number, query.ray.t_min, query.t, leaf=True, empty=not cell.entries)
+        for near, item in cell.entries:
+            if near < nearness or query.t == -math.inf:
+                break
+            query.test(item)
+        return True
+
+    def _make_room(self, number):
+        """Give up the buffers not used for longest when all take too much memory."""
+        self.bytes[number] = memory_of(*(root for _, root in self.buffers[number].faces.values()))
+        while len(self.buffers) > 1 and sum(self.bytes[k] for k in self.buffers) > self.max_bytes:
+            self.buffers.pop(next(iter(self.buffers)))
+        name = self.lights[number].name
+        if self.bytes[number] > self.max_bytes and not any(n.name == name for n in self.notices):
+            self.notices.append(Notice(name, f"its buffer takes {self.bytes[number]} bytes, more than max_bytes = {self.max_bytes:g}. "
+                                       "Raise max_bytes, lower the resolution, or name another technique for shadow rays."))
+
+
+class OneLight(Structure):
+    """Shadow rays to one light of a light buffer; those that go elsewhere are handed over."""
+
+    def __init__(self, owner, number):
+        self.owner, self.number = owner, number
+        self.primitives, self.parameters, self.figures, self.notices = owner.primitives, owner.parameters, owner.figures, owner.notices
+        self.scene, self.technique = owner.scene, getattr(owner, "technique", None)
+
+    def walk(self, query):
+        if not self.owner.serve(self.number, query):
+            self.owner.hand_over(query)
+
+
+def _fits(light):
+    """Whether a light has one place or one direction."""
+    where = light.direction if light.kind == "sun" else light.position
+    return light.kind in ("point", "spot", "sun") and all(map(math.isfinite, where)) and (light.kind != "sun" or any(where))
+
+
+class _Point:
+    """The direction cube of a point or spot light."""
+
+    def __init__(self, light, primitives, extra, max_depth):
+        self.extra = max(extra, *map(abs, light.position))
+        self.cube = Cube(light.position, primitives, self.extra, max_depth)
+
+    @property
+    def faces(self):
+        return self.cube.faces
+
+    @property
+    def parts(self):
+        return len(self.cube.faces)
+
+    def place(self, ray):
+        """What :meth:`cell` needs of a ray that goes to the light, else None."""
+        w = [a - b for a, b in zip(ray.o, self.cube.position)]
+        squared = sum(c * c for c in ray.d)
+        reach = -sum(a * b for a, b in zip(w, ray.d)) / squared
+        beside = max(abs(a + reach * b) for a, b in zip(w, ray.d))
+        if not (beside <= BESIDE * self.extra and max(map(abs, ray.o)) <= self.extra and reach > 0.0 and 0.0 <= ray.t_min
+                and ray.t_max <= reach and reach * math.sqrt(squared) > 2.0**-30 * self.extra):
+            return None
+        return w, reach
+
+    def cell(self, place, ray):
+        """The cell that a ray passes through, the least nearness that matters, and the greatest that it reaches."""
+        w, reach = place
+        number, u, v, z = Cube.through(w)
+        root = self.cube.face(number)[1]
+        begin, end = z * (1.0 - ray.t_min / reach), z * (1.0 - ray.t_max / reach)
+        return (root.leaf(u, v), (1.0 - LOSS) / begin if begin > 0.0 else math.inf, (1.0 - LOSS) / end if end > 0.0 else math.inf)
+
+
+class _Sun:
+    """The parallel window of the sun."""
+
+    def __init__(self, light, primitives, extra, max_depth):
+        length = math.hypot(*light.direction)
+        forward = tuple(c / length for c in light.direction)
+        least = min(range(3), key=lambda a: abs(forward[a]))
+        right = cross(forward, tuple(float(a == least) for a in range(3)))
+        length = math.hypot(*right)
+        right = tuple(c / length for c in right)
+        lo, hi = (tuple(map(f, zip(*(getattr(p, end) for p in primitives)))) for f, end in ((min, "lo"), (max, "hi")))
+        radius = 0.5 * math.dist(lo, hi) * 1.01 or 1.0
+        # The scene lies behind the plane where z = 0, and within the window.
+        position = tuple(0.5 * (l + h) - 2.0 * radius * f for l, h, f in zip(lo, hi, forward))
+        self.view = View(position, right, cross(forward, right), forward, (-radius, radius) * 2, False, extra)
+        self.primitives, self.max_depth, self.faces = primitives, max_depth, {}
+
+    @property
+    def parts(self):
+        return len(self.faces)
+
+    def place(self, ray):
+        """What :meth:`cell` needs of a ray that goes to the sun, else None."""
+        forward = self.view.rows[2]
+        along = sum(a * b for a, b in zip(forward, ray.d))
+        across = max(abs(a - along * b) for a, b in zip(ray.d, forward))
+        if not (self.view.usable and along < 0.0 and across <= 2.0**-48 * -along and max(map(abs, ray.o)) <= self.view.extra and ray.t_min >= 0.0):
+            return None
+        u, v, z = self.view.point(ray.o)
+        return (u, v, z, along) if abs(u) <= 1.0 and abs(v) <= 1.0 else None
+
+    def cell(self, place, ray):
+        """The cell that a ray passes through, the least nearness that matters, and the greatest that it reaches."""
+        u, v, z, along = place
+        if not self.faces:
+            footprints = [f for f in (self.view.footprint(i, p) for i, p in enumerate(self.primitives)) if f is not None]
+            self.faces[0] = self.view, divide(footprints, max_depth=self.max_depth)
+        begin, end = z + ray.t_min * along, z + ray.t_max * along
+        return (self.faces[0][1].leaf(u, v), -begin - LOSS * (abs(begin) + abs(z)), -end - LOSS * abs(end) if end > -math.inf else math.inf)
