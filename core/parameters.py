@@ -76,10 +76,10 @@ class Parameter:
         where = f"{technique}: parameter {self.name!r}"
         if self.choices:
             choices = self.choices_in(core)
-            if value not in choices:
+            if str(value) not in choices:               # 14 and "14" are the same choice
                 raise ParameterError(
                     f"{where} is one of {', '.join(choices)} (core {core!r}), not {value!r}.")
-            return value
+            return str(value)
         if self.type is bool:
             if isinstance(value, str) and value.lower() in ("true", "false", "on", "off", "1", "0"):
                 return value.lower() in ("true", "on", "1")

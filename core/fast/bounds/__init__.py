@@ -221,4 +221,6 @@ def between(t_in, t_out, low, high, origin, inverse):
     # Minus infinity could not be widened.
     near, far = np.minimum(near, far), np.maximum(np.maximum(near, far), -LARGEST)
     far += np.abs(far) * (2.0 * EPSILON)                # Ize 2013
+    if np.isfinite(inverse).all():                      # no NaN, and these are quicker
+        return np.maximum(t_in, near), np.minimum(t_out, far)
     return np.fmax(t_in, near), np.fmin(t_out, far)

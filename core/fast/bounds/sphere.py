@@ -73,6 +73,9 @@ def smallest(centre, radius, offset):
     """
     n, total = len(offset), len(radius)
     count = np.diff(offset, append=total)
+    # Seen from each segment's first ball, so that nothing cancels far from the origin.
+    origin = centre[:, offset]
+    centre = centre - np.repeat(origin, count, axis=1)
     c, r = centre[:, offset].copy(), radius[offset].copy()
     # Up to four balls that determine each sphere; -1 for none.
     basis = np.full((4, n), -1)
@@ -97,7 +100,7 @@ def smallest(centre, radius, offset):
         if not len(going):
             break
     own = np.repeat(np.arange(n), count)
-    return c, np.maximum.reduceat(_distance(centre, c[:, own]) + radius, offset)
+    return c + origin, np.maximum.reduceat(_distance(centre, c[:, own]) + radius, offset)
 
 
 def _segments(start, size):

@@ -11,8 +11,9 @@ from ..bounds import maker, meets
 from ..structure import Structure
 from .volume_tree import follow
 
-#: Pairs of rays and volumes tested at a time: they should stay in the caches.
-PAIRS = 65_536
+#: Pairs of rays and volumes tested at a time. Larger arrays would not stay in the caches, and each new one would be new
+#: memory from the system.
+PAIRS = 8_192
 
 
 class SortedList(Structure):

@@ -67,6 +67,9 @@ class Sphere(Volume):
 
 def smallest(some):
     """The smallest sphere around balls, a list of (centre, radius); returns its centre and radius."""
+    # Seen from the first ball, so that nothing cancels far from the origin.
+    origin = some[0][0]
+    some = [(tuple(x - y for x, y in zip(p, origin)), r) for p, r in some]
     basis = [some[0]]
     centre, radius = some[0]
     for _ in range(STEPS):
@@ -77,7 +80,7 @@ def smallest(some):
         if found is None or not found[1] > radius:
             break
         centre, radius, basis = found
-    return centre, max(math.dist(p, centre) + r for p, r in some)
+    return tuple(x + y for x, y in zip(centre, origin)), max(math.dist(p, centre) + r for p, r in some)
 
 
 def _of_five(ball, basis):
@@ -89,6 +92,7 @@ def _of_five(ball, basis):
             d = [tuple(x - y for x, y in zip(p, base)) for p, _ in subset]
             for x, radius in _touching(d, r0, [r for _, r in subset]):
                 centre = tuple(b + v for b, v in zip(base, x))
+                # Of a set of at most five, none sticks out.
                 holds = all(math.dist(p, centre) + r <= radius * (1.0 + 1e-9) for p, r in (ball, *basis))
                 if radius >= r0 and holds and (best is None or radius < best[1]):
                     best = centre, radius, [ball, *subset]
