@@ -44,7 +44,7 @@ class BspTree(CellTree):
         if self.figures["N_ER"] > 8 * n:
             self.notices.append(bsp_notice(self.figures["N_ER"], n))
 
-    def divide(self, cells):
+    def divide(self, cells, worth):
         """Divide cells; see ``growth.grow``."""
         m, cell, n = len(cells.count), cells.cell, cells.count
         tolerance = TOLERANCE * self.margin
@@ -54,7 +54,9 @@ class BspTree(CellTree):
             w = distance.take(cell)
             below, above = low < w - tolerance, high > w + tolerance
             left, right = np.bincount(cell[below], minlength=m), np.bincount(cell[above], minlength=m)
-            score = left + right + np.maximum(left, right)
+            lo, hi = self._boxes(cells, np.concatenate([normal, distance[None]]))
+            area = box_area(lo, hi)
+            score = area[0::3] * left + area[2::3] * right
             better = (score < best) & (np.maximum(left, right) < n) & np.isfinite(distance)
             best = np.where(better, score, best)
             plane[:, better] = np.concatenate([normal, distance[None]])[:, better]

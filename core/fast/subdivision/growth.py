@@ -99,9 +99,9 @@ def grow(divide, root, arity, n, stop, max_depth, leaf_size, max_bytes, node_byt
     Parameters
     ----------
     divide : callable
-        (cells) -> (plane (3, m), children: Cells, cost (m,)): each cell's `arity` children stand one after the other,
-        and `cost` is the expected cost of a ray in the divided cell, in tests. The plane of a cell that cannot be
-        divided is inf along all axes.
+        (cells, worth) -> (plane (3, m), children: Cells, cost (m,)): each cell's `arity` children stand one after the
+        other, and `cost` is the expected cost of a ray in the divided cell, in tests. The plane of a cell that cannot be
+        divided is inf along all axes; so may be that of one that need not be, since ``worth(cost)`` is false for it.
     root : Cells
     n : int
         Primitives.
@@ -137,13 +137,18 @@ class _Growth:
         while len(number):
             wanted = np.flatnonzero(cells.count > self.leaf_size) if level < self.max_depth else np.zeros(0, np.int64)
             some = cells.take(wanted)
-            plane, children, cost = self.divide(some)
+            before = bad[wanted]
+
+            def worth(cost, some=some, before=before):
+                missed = cost >= some.count
+                return (before + missed <= BAD_AT_MOST) & ~((cost > 4.0 * some.count) & (some.count < 16))
+
+            plane, children, cost = self.divide(some, worth if by_cost else None)
             children.level[:] = level + 1
             good = np.isfinite(plane).any(axis=0)
-            misses = bad[wanted]
             if by_cost:
-                misses = misses + (cost >= some.count)
-                good &= (misses <= BAD_AT_MOST) & ~((cost > 4.0 * some.count) & (some.count < 16))
+                good &= worth(cost)
+            misses = before + (cost >= some.count)
             good = self._guarded(good, settled + cells.count.sum(), some, children, level)
             kept = np.flatnonzero(good)
             leaf = np.ones(len(number), bool)
@@ -197,7 +202,7 @@ class _Growth:
                 batch = [cell, *(c for _, c, _ in heapq.nsmallest(BATCH, queue) if c not in ready)]
                 some = [contents[c] for c in batch]
                 together = joined(some)
-                plane, children, _ = self.divide(together)
+                plane, children, _ = self.divide(together, None)
                 children.level = np.repeat(together.level + 1, self.arity)
                 for k, c in enumerate(batch):
                     ready[c] = plane[:, k:k + 1], children.take(np.arange(k * self.arity, (k + 1) * self.arity))

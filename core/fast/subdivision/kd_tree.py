@@ -34,26 +34,43 @@ class KdTree(CellTree):
         self.axis = (finite[1] + 2 * finite[2]).astype(np.int64)
         self.figures["memory"] += self.axis.nbytes
 
-    def divide(self, cells):
+    def divide(self, cells, worth):
         """Divide cells; see ``growth.grow``."""
-        m, cell = len(cells.count), cells.cell
-        axis, at = self._middle(cells) if self.split == "middle" else self._cheapest(cells, cell)
+        m = len(cells.count)
+        axis, at, cost = self._middle(cells) if self.split == "middle" else self._cheapest(cells, cells.cell)
         i = np.arange(m)
+        good = (cells.lo[i, axis] < at) & (at < cells.hi[i, axis])
+        if worth and cost is not None:
+            good &= worth(cost)
         plane = np.full((3, m), np.inf)
-        plane[axis, i] = np.where((cells.lo[i, axis] < at) & (at < cells.hi[i, axis]), at, np.inf)
+        plane[axis, i] = np.where(good, at, np.inf)
         lo, hi = np.repeat(cells.lo, 2, axis=0), np.repeat(cells.hi, 2, axis=0)
         hi[2 * i, axis] = lo[2 * i + 1, axis] = at
+        good = np.flatnonzero(good)
+        child, item, boxes = self._sorted_in(cells.take(good), good, axis, at, lo, hi)
+        count = np.bincount(child, minlength=2 * m)
+        if cost is None:
+            area = box_area(cells.lo, cells.hi)
+            cost = 1.0 + (box_area(lo, hi) * count).reshape(-1, 2).sum(axis=1) / np.where(area > 0.0, area, 1.0)
+        return plane, Cells(lo, hi, count, item, boxes), cost
+
+    def _sorted_in(self, cells, number, axis, at, lo, hi):
+        """The references of some cells' children: child, primitive, box of its part.
+
+        `number` says which cells they are; axis and position of their planes, and their children's lo and hi, are those of
+        all cells.
+        """
         own_lo, own_hi = cells.more
-        r = np.arange(len(cell))
-        along = axis[cell]
-        below, above = own_lo[r, along] < at[cell], own_hi[r, along] > at[cell]
-        both = below & above
+        cell = np.repeat(number, cells.count)
+        place = np.arange(len(cell)) * 3 + axis.take(cell)
+        split = at.take(cell)
+        below, above = own_lo.ravel().take(place) < split, own_hi.ravel().take(place) > split
         left, right = np.flatnonzero(below), np.flatnonzero(above)
         ref, child = np.concatenate([left, right]), np.concatenate([2 * cell[left], 2 * cell[right] + 1])
         order = np.argsort(child, kind="stable")
-        ref, child = ref[order], child[order]
-        part_lo, part_hi = own_lo[ref], own_hi[ref]
-        cut = np.flatnonzero(both[ref])
+        ref, child = ref.take(order), child.take(order)
+        part_lo, part_hi = own_lo.take(ref, axis=0), own_hi.take(ref, axis=0)
+        cut = np.flatnonzero((below & above).take(ref))
         if len(cut):
             part_lo[cut], part_hi[cut] = self._part(cells.item[ref[cut]], lo[child[cut]], hi[child[cut]], part_lo[cut], part_hi[cut])
             # A part that is empty is nowhere in the cell, not even near its faces.
@@ -61,13 +78,7 @@ class KdTree(CellTree):
             there[cut] = (part_lo[cut] < part_hi[cut]).all(axis=1)
             if not there.all():
                 ref, child, part_lo, part_hi = ref[there], child[there], part_lo[there], part_hi[there]
-        count = np.bincount(child, minlength=2 * m)
-        area = box_area(cells.lo, cells.hi)
-        cost = 1.0 + (box_area(lo, hi) * count).reshape(-1, 2).sum(axis=1) / np.where(area > 0.0, area, 1.0)
-        empty = (count.reshape(-1, 2) == 0).any(axis=1)
-        if self.split == "sah":
-            cost = np.where(empty, 1.0 + (1.0 - self.empty_bonus) * (cost - 1.0), cost)
-        return plane, Cells(lo, hi, count, cells.item[ref], (part_lo, part_hi)), cost
+        return child, cells.item.take(ref), (part_lo, part_hi)
 
     def _part(self, item, lo, hi, own_lo, own_hi):
         """Boxes of the parts of primitives in cells, larger by the margin."""
@@ -82,13 +93,13 @@ class KdTree(CellTree):
         return own_lo, own_hi
 
     def _middle(self, cells):
-        """The middle, along the axes in turn."""
+        """The middle, along the axes in turn; its cost is not known yet."""
         axis = cells.level % 3
         i = np.arange(len(axis))
-        return axis, 0.5 * cells.lo[i, axis] + 0.5 * cells.hi[i, axis]
+        return axis, 0.5 * cells.lo[i, axis] + 0.5 * cells.hi[i, axis], None
 
     def _cheapest(self, cells, cell):
-        """Axis and position of the cheapest plane of each cell.
+        """Axis, position and cost of the cheapest plane of each cell.
 
         The ends of all boxes are sorted, those of a cell together, by their positions as whole numbers; ends of boxes come
         before beginnings at the same place. So, before a beginning, and after an end, the numbers of boxes on either
@@ -139,7 +150,7 @@ class KdTree(CellTree):
             event = event.take(better)
             exact = self._exact(position.take(event), begin.take(event), better, m, cell, begins, ends, own_lo[:, a], own_hi[:, a])
             best[better], axis[better], at[better] = least[better], a, exact
-        return axis, at
+        return axis, at, 1.0 + best
 
     @staticmethod
     def _exact(position, begin, better, m, cell, begins, ends, own_lo, own_hi):

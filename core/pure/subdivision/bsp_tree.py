@@ -43,7 +43,8 @@ class BspTree(CellTree):
             extents = [self._extent(item, corners, normal) for item, corners in zip(node.items, node.boxes)]
             left = sum(low < distance - tolerance for low, _ in extents)
             right = sum(high > distance + tolerance for _, high in extents)
-            score = left + right + max(left, right)
+            lower, _, upper = (_area(*box) for box in _boxes(node.lo, node.hi, normal, distance))
+            score = lower * left + upper * right
             if score < best and max(left, right) < len(node.items):
                 best, plane = score, (*normal, distance)
         if plane is None:
@@ -144,6 +145,12 @@ def _cut(corners, normal, w):
             f = d0 / (d0 - d1)
             kept.append(tuple(x + f * (y - x) for x, y in zip(here, corners[following])))
     return kept
+
+
+def _area(lo, hi):
+    """Surface area of a box."""
+    x, y, z = (max(h - l, 0.0) for l, h in zip(lo, hi))
+    return 2.0 * (x * y + y * z + z * x)
 
 
 def _boxes(lo, hi, normal, w):

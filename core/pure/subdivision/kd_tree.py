@@ -26,7 +26,7 @@ class KdTree(CellTree):
         self.grow(root, progress, stop, max_depth or depth_for(n), leaf_size, max_bytes, walk, lists)
 
     def divide(self, node):
-        axis, at = self._middle(node) if self.split == "middle" else self._cheapest(node)
+        axis, at, cost = self._middle(node) if self.split == "middle" else self._cheapest(node)
         if at is None or not node.lo[axis] < at < node.hi[axis]:
             return None
         plane = tuple(at if a == axis else math.inf for a in range(3))
@@ -44,10 +44,9 @@ class KdTree(CellTree):
                         continue
                 child.items.append(item)
                 child.boxes.append(box)
-        area = node.area
-        cost = 1.0 + (left.area * len(left.items) + right.area * len(right.items)) / (area if area > 0.0 else 1.0)
-        if self.split == "sah" and not (left.items and right.items):
-            cost = 1.0 + (1.0 - self.empty_bonus) * (cost - 1.0)
+        if cost is None:
+            area = node.area
+            cost = 1.0 + (left.area * len(left.items) + right.area * len(right.items)) / (area if area > 0.0 else 1.0)
         return plane, [left, right], cost
 
     def _part(self, item, cell, lo, hi):
@@ -61,12 +60,12 @@ class KdTree(CellTree):
 
     @staticmethod
     def _middle(node):
-        """The middle, along the axes in turn."""
+        """The middle, along the axes in turn; its cost is not known yet."""
         axis = node.level % 3
-        return axis, 0.5 * node.lo[axis] + 0.5 * node.hi[axis]
+        return axis, 0.5 * node.lo[axis] + 0.5 * node.hi[axis], None
 
     def _cheapest(self, node):
-        """Axis and position of the cheapest plane: a sweep over the ends of all boxes, from the lowest to the highest.
+        """Axis, position and cost of the cheapest plane: a sweep over the ends of all boxes, from the lowest to the highest.
 
         Positions are whole numbers; ends of boxes come before beginnings at the same place. So, before a beginning, and
         after an end, the numbers of boxes on either side are known by counting.
@@ -97,4 +96,4 @@ class KdTree(CellTree):
             if cheapest:
                 exact = [at for position, what, at in events if (position, what) == cheapest]
                 best_at = min(exact) if cheapest[1] == BEGIN else max(exact)
-        return best_axis, best_at
+        return best_axis, best_at, 1.0 + best
