@@ -1,0 +1,128 @@
+"""Inspection: what is booked to objects adds up, every cause is found where it is and not elsewhere, remedies are tried."""
+import json
+
+import numpy as np
+import pytest
+from rayscope.core import Camera, Light, Material, Mesh, Object, Scene, SceneError, Shapes, solids, trace
+from rayscope.core.command import main
+from rayscope.core.lab import inspect as inspecting
+from rayscope.core.lab import stress
+
+CAMERA = Camera.look_at((0.0, -8.0, 1.0), (0.0, 0.0, 0.0))
+
+
+def placed(name, mesh, at=(0, 0, 0), scale=1.0, **more):
+    matrix = np.eye(4)
+    matrix[:3, :3] *= scale
+    matrix[:3, 3] = at
+    return Object(name, mesh, matrix, **more)
+
+
+def ball(rows=8, seed=0):
+    return stress.ball(np.random.default_rng(seed), rows)
+
+
+def seen(objects, **more):
+    return Scene(list(objects), [Light("lamp", "point", (50.0, 50.0, 50.0), (3.0, -5.0, 5.0))], CAMERA, **more)
+
+
+def causes(result):
+    return {(f.cause, *f.objects) for f in result.findings}
+
+
+def test_everything_is_booked():
+    scene = seen([placed("left", ball(), (-1.2, 0, 0)), placed("right", ball(6), (1.2, 0, 0), materials=(Material(mirror=0.5),)),
+                  Object("solid", Shapes([solids.sphere((0, 0, 2), 0.5)]))])
+    ledger, result = inspecting.measure(scene, size=(40, 30))
+    plain = trace(scene, size=(40, 30), count=True)
+    assert ledger.tests.sum() == result.passes["n_it"].sum() == plain.passes["n_it"].sum()
+    assert ledger.steps.sum() == pytest.approx(result.passes["n_ts"].sum())
+    kinds = [row for row in plain.figures.values() if isinstance(row, dict)]
+    assert ledger.rays == sum(row["rays"] for row in kinds) and {r["rays"] > 0 for r in kinds[:2]} == {True}
+    assert (ledger.hits > 0).all() and ledger.of_primitive.sum() == ledger.tests.sum()
+    found = inspecting.inspect(scene)
+    assert sum(r["tests"] for r in found.rows) == pytest.approx(1.0) and sum(r["steps"] for r in found.rows) == pytest.approx(1.0)
+    assert not found.findings and "Findings: none" in inspecting.text(found)
+
+
+def test_not_reached_duplicates_and_copies():
+    same = ball(8)
+    moved = Mesh(same.vertices @ np.linalg.qr(np.random.default_rng(1).normal(size=(3, 3)))[0] + (2.5, 0, 0), same.triangles)
+    scene = seen([placed("one", same), placed("doubled", same), placed("behind", ball(6, 3), (0, -30, 0)), Object("made real", moved)])
+    result = inspecting.inspect(scene)
+    assert {("duplicate", "doubled"), ("not reached", "behind"), ("copies", "one", "made real")} <= causes(result)
+    assert not {c for c in causes(result) if c[0] in ("not reached", "duplicate") and "made real" in c}
+    doubled = next(f for f in result.findings if f.cause == "duplicate")
+    assert 0.15 < doubled.gain < 0.8
+    gains = [f.gain or 0.0 for f in result.findings]
+    assert gains == sorted(gains, reverse=True)
+
+
+def test_slivers_and_diagonals():
+    rng = np.random.default_rng(2)
+    start = np.stack([rng.uniform(-2, 2, 60), rng.uniform(-1, 1, 60), np.full(60, -1.5)], axis=1)
+    along = np.stack([rng.uniform(1, 2, 60), rng.uniform(1, 2, 60), rng.uniform(2, 3, 60)], axis=1)
+    needles = np.stack([start, start + along, start + along + (0.004, 0, 0)], axis=1)
+    blades = np.stack([start, start + along, start + along + (0.15, 0, 0)], axis=1) + (0.5, 0, 0)
+    scene = seen([Object("needles", stress.soup(needles).objects[0].geometry), Object("blades", stress.soup(blades).objects[0].geometry),
+                  placed("ball", ball(), (0, 3, 0))])
+    result = inspecting.inspect(scene)
+    assert ("slivers", "needles") in causes(result) and ("slivers", "ball") not in causes(result)
+    diagonal = next(f for f in result.findings if f.cause == "diagonal" and f.objects == ["blades"])
+    assert diagonal.number > 2.0 and diagonal.gain > 0.0
+    assert ("diagonal", "ball") not in causes(result)
+
+
+def test_sub_pixel_tiny_and_overlapping():
+    floor = Mesh([(-300, -300, -1), (300, -300, -1), (300, 300, -1), (-300, 300, -1)], [(0, 1, 2), (0, 2, 3)])
+    tiny = placed("teapot", ball(20), (0, 0, 0), 0.01)
+    result = inspecting.inspect(seen([Object("stadium", floor), tiny]), "grid")
+    assert {("sub-pixel", "teapot"), ("tiny and detailed", "teapot")} <= causes(result)
+    assert next(f for f in result.findings if f.cause == "tiny and detailed").gain > 0.2
+    assert "Decimate" in next(f for f in result.findings if f.cause == "sub-pixel").remedy
+    hidden = inspecting.inspect(seen([placed("outer", ball(8)), placed("inner", ball(8, 5), (0, 0, 0), 0.8)]))
+    overlap = [f for f in hidden.findings if f.cause == "overlap"]
+    assert overlap and overlap[0].gain > 0.05 and "inner" in overlap[0].remedy
+
+
+def test_a_remedy_keeps_the_picture():
+    scene = seen([placed("one", ball())])
+    corners = inspecting.world_corners(scene.objects[0])
+    halved = inspecting._halved(corners, lambda c: np.ones(len(c), bool), 2)
+    assert len(halved) == 4 * len(corners)
+    pictures = [trace(s, size=(24, 24)).passes["depth"] for s in (scene, inspecting.with_mesh(0, halved)(scene))]
+    assert np.array_equal(np.isinf(pictures[0]), np.isinf(pictures[1]))
+    assert np.allclose(*(np.nan_to_num(p, posinf=0.0) for p in pictures), atol=1e-5)
+
+
+def test_warnings():
+    mesh = ball(6)
+    flat = placed("flat", mesh, (5, 0, 0))
+    flat.matrix[2, :3] = 0.0
+    flat.matrix[:3, 2] = 0.0
+    needle = Mesh([(0, 0, 9), (1, 1, 9), (1, 1 + 1e-6, 9)], [(0, 1, 2)])
+    twice = Mesh(mesh.vertices + (0, 9, 0), np.concatenate([mesh.triangles, mesh.triangles[:5, [1, 2, 0]]]))
+    scene = Scene([placed("far", mesh, (0, 1e6, 0)), flat, Object("needle", needle), placed("speck", mesh, (0, 0, 5), 1e-4), placed("double", mesh, (0, 1e6, 0)),
+                   Object("twice", twice), placed("good", ball(5, 7), (0, -5, 0))])
+    found = {(f.cause, *f.objects): f for f in inspecting.warnings(scene)}
+    assert {("far from the origin", "far"), ("zero scale", "flat"), ("slivers", "needle"), ("coincident surfaces", "far", "double"),
+            ("coincident surfaces", "twice")} <= set(found)
+    assert found["coincident surfaces", "twice"].number == 5 and found["coincident surfaces", "far", "double"].number == len(mesh)
+    assert not any("good" in key for key in found)
+    assert all(f.text and f.remedy.endswith(".") for f in found.values())
+    wide = Scene([placed("bolt", mesh, (0, 0, 0), 1e-4), placed("planet", mesh, (0, 0, 0), 1e4)])
+    assert ("range of scale", "bolt", "planet") in {(f.cause, *f.objects) for f in inspecting.warnings(wide)}
+    assert not inspecting.warnings(Scene([placed("good", mesh)])) and not inspecting.warnings(Scene())
+
+
+def test_errors_and_the_verb(tmp_path, capsys):
+    with pytest.raises(SceneError, match="camera"):
+        inspecting.inspect(Scene([placed("one", ball())]))
+    with pytest.raises(SceneError, match="nothing to trace"):
+        inspecting.inspect(Scene(camera=CAMERA))
+    path = tmp_path / "scene.nff"
+    path.write_text("v\nfrom 0 0 5\nat 0 0 0\nup 0 1 0\nangle 40\nhither 1\nresolution 16 16\nf 1 0 0 1 0 0 0 1\ns 0 0 0 1\n")
+    assert main(["inspect", str(path), "--json"]) == 0
+    record = json.loads(capsys.readouterr().out)
+    assert record["rows"][0]["tests"] == 1.0 and record["rays"] > 1000
+    assert main(["inspect", str(path)]) == 0 and "tests and steps" in capsys.readouterr().out
