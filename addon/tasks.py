@@ -47,9 +47,11 @@ class Build:
         self.estimate = estimate(self.scene, self.choice["technique"], self.choice["core"]).check_memory()
 
     def __call__(self, progress):
+        from . import inspection
         from ..core import build
         index = build(self.scene, self.choice["technique"], self.choice["core"], progress=lambda fraction: progress(0.95 * fraction),
                       **self.choice["parameters"])
+        inspection.warn(self.uid, self.scene)
         return session.Built(self.scene, index, index.cells(), self.n_objects)
 
 
