@@ -35,8 +35,9 @@ def facets(kind, capped=True, ratio=0.0, segments=SEGMENTS):
     if kind == "pyramid":
         return PYRAMID_CORNERS, [(3, 2, 1, 0), *((i, (i + 1) % 4, 4) for i in range(4))], [False] * 5
     if kind == "polygon":
-        star = [(r * math.sin(a), r * math.cos(a), 0.0) for a, r in
-                zip(np.arange(10) * (-math.pi / 5.0), [1.0, 0.4] * 5)]
+        star = [
+            (r * math.sin(a), r * math.cos(a), 0.0) for a, r in zip(np.arange(10) * (-math.pi / 5.0), [1.0, 0.4] * 5)
+        ]
         return star, [tuple(range(10))], [False]
     angle = 2.0 * math.pi / segments * np.arange(segments)
     if kind == "sphere":
@@ -48,8 +49,16 @@ def facets(kind, capped=True, ratio=0.0, segments=SEGMENTS):
         rings = [(1.0, 0.0), (top, 1.0)] if top > 0.0 else [(1.0, 0.0)]
         ends, closed = (None, None if top > 0.0 else (0.0, 0.0, 1.0)), (capped, capped or not top > 0.0)
     vertices = [(r * math.cos(a), r * math.sin(a), z) for r, z in rings for a in angle]
-    faces = [(k * segments + i, k * segments + (i + 1) % segments, (k + 1) * segments + (i + 1) % segments, (k + 1) * segments + i)
-             for k in range(len(rings) - 1) for i in range(segments)]
+    faces = [
+        (
+            k * segments + i,
+            k * segments + (i + 1) % segments,
+            (k + 1) * segments + (i + 1) % segments,
+            (k + 1) * segments + i,
+        )
+        for k in range(len(rings) - 1)
+        for i in range(segments)
+    ]
     smooth = [True] * len(faces)
     for end, is_closed, first, sense in zip(ends, closed, (0, (len(rings) - 1) * segments), (-1, 1)):
         ring = [(first + i, first + (i + 1) % segments)[::sense] for i in range(segments)]

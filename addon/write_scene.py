@@ -39,7 +39,9 @@ def write_scene(scene, context):
     for obj in scene.objects:
         materials = [_material(m) for m in obj.materials]
         for (kind, capped, ratio, slot), matrices in _groups(obj).items():
-            _instances(collection, kind, {"capped": capped, "ratio": ratio}, materials[min(slot, len(materials) - 1)], matrices)
+            _instances(
+                collection, kind, {"capped": capped, "ratio": ratio}, materials[min(slot, len(materials) - 1)], matrices
+            )
         for smooth in (False, True):
             _polygons(collection, obj, smooth, materials)
     lo, hi = scene.bounds()
@@ -92,17 +94,28 @@ def _node_group(source):
     group.interface.new_socket("Geometry", in_out="OUTPUT", socket_type="NodeSocketGeometry")
     group.interface.new_socket("Geometry", in_out="INPUT", socket_type="NodeSocketGeometry")
     made = {}
-    for column, kind in enumerate(("NodeGroupInput", "GeometryNodeObjectInfo", "GeometryNodeInputNamedAttribute", "GeometryNodeInstanceOnPoints",
-                                   "GeometryNodeSetInstanceTransform", "NodeGroupOutput")):
+    for column, kind in enumerate(
+        (
+            "NodeGroupInput",
+            "GeometryNodeObjectInfo",
+            "GeometryNodeInputNamedAttribute",
+            "GeometryNodeInstanceOnPoints",
+            "GeometryNodeSetInstanceTransform",
+            "NodeGroupOutput",
+        )
+    ):
         made[kind] = group.nodes.new(kind)
         made[kind].location = (200.0 * column, 0.0)
     start, info, attribute, places, transform, end = made.values()
     info.inputs["Object"].default_value, info.inputs["As Instance"].default_value = source, True
     attribute.data_type, attribute.inputs["Name"].default_value = "FLOAT4X4", PLACEMENT
-    for output, to in ((start.outputs["Geometry"], places.inputs["Points"]), (info.outputs["Geometry"], places.inputs["Instance"]),
-                       (places.outputs["Instances"], transform.inputs["Instances"]),
-                       (next(o for o in attribute.outputs if o.enabled), transform.inputs["Transform"]),
-                       (transform.outputs["Instances"], end.inputs["Geometry"])):
+    for output, to in (
+        (start.outputs["Geometry"], places.inputs["Points"]),
+        (info.outputs["Geometry"], places.inputs["Instance"]),
+        (places.outputs["Instances"], transform.inputs["Instances"]),
+        (next(o for o in attribute.outputs if o.enabled), transform.inputs["Transform"]),
+        (transform.outputs["Instances"], end.inputs["Geometry"]),
+    ):
         group.links.new(output, to)
     return group
 
@@ -143,9 +156,14 @@ def _material(own):
     mirror = max(own.mirror, own.mirror_base)
     whole = own.diffuse + mirror + own.transmission
     colour = [min(1.0, c * min(1.0, whole)) for c in own.base]
-    values = {"Base Color": (*colour, 1.0), "Metallic": mirror / whole if whole else 0.0, "Roughness": 0.0 if mirror or own.transmission else 1.0,
-              "IOR": max(1.0, own.ior), "Specular IOR Level": 0.5 if own.transmission else 0.0,
-              "Transmission Weight": own.transmission / (own.diffuse + own.transmission) if own.transmission else 0.0}
+    values = {
+        "Base Color": (*colour, 1.0),
+        "Metallic": mirror / whole if whole else 0.0,
+        "Roughness": 0.0 if mirror or own.transmission else 1.0,
+        "IOR": max(1.0, own.ior),
+        "Specular IOR Level": 0.5 if own.transmission else 0.0,
+        "Transmission Weight": own.transmission / (own.diffuse + own.transmission) if own.transmission else 0.0,
+    }
     for name, value in values.items():
         shader.inputs[name].default_value = value
     made.diffuse_color = (*colour, 1.0)  # as the solid viewport shows it

@@ -7,6 +7,7 @@ still_life.blend            mirror, glass, a subdivided Suzanne, a textured floo
 forest.blend                more than a million triangles, placed as instances of a few plants
 teapot_in_a_stadium.blend   one small detailed thing in a huge room: what breaks grids
 interior.blend              two rooms, a doorway, eight lamps, polygons only
+csg.blend                   Boolean modifiers as CSG trees, of Rayscope primitives and of a mesh; primitives alone
 """
 
 import math
@@ -21,6 +22,8 @@ from mathutils import Matrix, Vector
 
 sys.path.insert(0, str(Path(__file__).resolve().parent))
 from teapot import teapot  # noqa: E402
+from rayscope.addon.stand_ins import stand_in  # noqa: E402
+from rayscope.addon.ui.primitives import register_properties  # noqa: E402
 
 
 # --- tools ---
@@ -607,11 +610,120 @@ def interior():
     bpy.context.scene.camera.data.clip_start = 0.01
 
 
-SCENES = (still_life, forest, teapot_in_a_stadium, interior)
+def primitive(kind, name, location=(0, 0, 0), rotation=(0, 0, 0), scale=(1, 1, 1), materials=(), capped=True, ratio=0.0,
+              data=None):
+    """An object that Rayscope traces as what it is."""
+    obj = place(data or stand_in(kind, capped, ratio), name, location, rotation, scale, materials=materials)
+    obj.rayscope.capped, obj.rayscope.ratio, obj.rayscope.kind = capped, ratio, kind
+    return obj
+
+
+def rod(name, centre, axis, radius, length, materials=()):
+    """A tagged cylinder about a point, along an axis."""
+    axis = Vector(axis).normalized()
+    turn = axis.to_track_quat("Z", "Y").to_euler()
+    return primitive("cylinder", name, Vector(centre) - axis * (length / 2), turn, (radius, radius, length), materials)
+
+
+def boolean(obj, operation, *operands):
+    """A Boolean modifier; its operands are hidden and leave their materials where they cut."""
+    modifier = obj.modifiers.new(operation.title(), "BOOLEAN")
+    modifier.operation, modifier.solver, modifier.material_mode = operation, "EXACT", "TRANSFER"
+    if len(operands) == 1:
+        modifier.object = operands[0]
+    else:
+        modifier.operand_type, modifier.collection = "COLLECTION", bpy.data.collections.new(f"{obj.name}: operands")
+        for operand in operands:
+            modifier.collection.objects.link(operand)
+    for operand in operands:
+        operand.hide_render, operand.hide_viewport, operand.display_type = True, True, "WIRE"
+
+
+def csg():
+    start((960, 540), sky=(0.35, 0.42, 0.55), strength=0.4)
+    floor = textured(material("Tiles", roughness=0.3), "Tiles", checks((0.82, 0.80, 0.76), (0.30, 0.33, 0.38)), 1.0)
+    place(plane("Floor", 24, 24, tiles=0.5), "Floor", materials=[floor])
+    red, blue, green = (material(name, colour, 0.45) for name, colour in
+                        (("Red", (0.65, 0.06, 0.04)), ("Blue", (0.05, 0.14, 0.55)), ("Green", (0.07, 0.42, 0.12))))
+    white, black = material("Ivory", (0.82, 0.78, 0.68), 0.3), material("Ink", (0.02, 0.02, 0.025), 0.4)
+    steel = material("Steel", (0.62, 0.64, 0.67), 0.42, metallic=1.0)
+    brass = material("Brass", (0.86, 0.62, 0.25), 0.4, metallic=1.0)
+    glass = material("Glass", (0.96, 1.0, 0.98), 0.0, transmission_weight=1.0, ior=1.5)
+
+    # (box * sphere) - three rods, as in the textbooks; each surface shows the solid that it is of.
+    at = Vector((-0.55, 0.9, 1.0))
+    body = primitive("box", "Textbook", at, materials=[red])
+    boolean(body, "INTERSECT", primitive("sphere", "Textbook ball", at, scale=(1.32,) * 3, materials=[blue]))
+    boolean(body, "DIFFERENCE", *(rod(f"Textbook rod {k + 1}", at, np.eye(3)[k], 0.55, 3.0, [green]) for k in range(3)))
+
+    # A die: pips are spheres, taken away by one modifier.
+    at, turn = Vector((-2.45, -0.5, 0.6)), Matrix.Rotation(math.radians(28), 3, "Z")
+    die = primitive("box", "Die", at, turn.to_euler(), (0.6,) * 3, [white])
+    boolean(die, "INTERSECT", primitive("sphere", "Die ball", at, scale=(0.86,) * 3, materials=[white]))
+    pip = stand_in("sphere", segments=12)
+    pip.materials.append(black)
+    spots = {1: [(0, 0)], 2: [(-1, -1), (1, 1)], 3: [(-1, 1), (0, 0), (1, -1)], 4: [(-1, -1), (-1, 1), (1, -1), (1, 1)]}
+    spots[5], spots[6] = spots[4] + [(0, 0)], spots[4] + [(-1, 0), (1, 0)]
+    pips = []
+    for number, normal in zip((1, 6, 2, 5, 3, 4),
+                              ((0, 0, 1), (0, 0, -1), (0, -1, 0), (0, 1, 0), (-1, 0, 0), (1, 0, 0))):
+        normal = Vector(normal)
+        side = Vector((normal.y, normal.z, normal.x))
+        for u, v in spots[number]:
+            where = normal * 0.63 + (side * u + normal.cross(side) * v) * 0.27
+            pips.append(primitive("sphere", f"Pip {len(pips) + 1}", at + turn @ where, scale=(0.11,) * 3, data=pip))
+    boolean(die, "DIFFERENCE", *pips)
+
+    # A lens of glass on a stand, and a nut: a mesh, chamfered by a cone and drilled.
+    at = Vector((1.45, -0.6, 1.0))
+    lens = primitive("sphere", "Lens", at + Vector((0, 1.05, 0)), scale=(1.3,) * 3, materials=[glass])
+    boolean(lens, "INTERSECT", primitive("sphere", "Lens other side", at - Vector((0, 1.05, 0)), scale=(1.3,) * 3,
+                                         materials=[glass]))
+    stand = primitive("cone", "Lens stand", (at.x, at.y, 0), scale=(0.42, 0.42, 0.3), ratio=0.6, materials=[brass])
+    boolean(stand, "DIFFERENCE", lens)
+    lens.hide_render = lens.hide_viewport = False
+    lens.display_type = "TEXTURED"
+    hexagon = from_bmesh("Nut", lambda b: bmesh.ops.create_cone(b, cap_ends=True, segments=6, radius1=0.62,
+                                                                radius2=0.62, depth=0.5))
+    nut = place(hexagon, "Nut", (-0.95, -1.45, 0.25), (0, 0, 0.3), materials=[steel])
+    boolean(nut, "INTERSECT", primitive("cone", "Nut chamfer", (-0.95, -1.45, -0.001), scale=(1.05, 1.05, 0.95),
+                                        materials=[steel]))
+    boolean(nut, "DIFFERENCE", rod("Nut hole", (-0.95, -1.45, 0.25), (0, 0, 1), 0.33, 2.0, [steel]))
+
+    # A cup: a nested tree (the hollow is itself rounded by a union), and a handle.
+    at = Vector((3.0, 0.7, 0.0))
+    cup = primitive("cylinder", "Cup", at, scale=(0.62, 0.62, 1.3), materials=[blue])
+    ring = rod("Cup handle", at + Vector((0.62, 0, 0.68)), (0, 1, 0), 0.42, 0.18, [blue])
+    boolean(ring, "DIFFERENCE", rod("Cup handle hole", at + Vector((0.62, 0, 0.68)), (0, 1, 0), 0.30, 1.0, [blue]))
+    hollow = primitive("cylinder", "Cup hollow", at + Vector((0, 0, 0.55)), scale=(0.54, 0.54, 2.0), materials=[white])
+    boolean(hollow, "UNION", primitive("sphere", "Cup bottom", at + Vector((0, 0, 0.55)), scale=(0.54, 0.54, 0.45),
+                                       materials=[white]))
+    boolean(cup, "UNION", ring)
+    boolean(cup, "DIFFERENCE", hollow)
+
+    # Primitives by themselves.
+    primitive("pyramid", "Pyramid", (-3.6, 2.3, 0), (0, 0, 0.4), (0.8, 0.8, 1.5), [brass])
+    primitive("cone", "Cone", (1.3, 2.9, 0), scale=(0.7, 0.7, 1.9), materials=[green])
+    primitive("cylinder", "Pipe", (4.4, 2.6, 0), (0, 0, 0), (0.55, 0.55, 1.6), [red], capped=False)
+    primitive("polygon", "Star", (-2.3, 3.6, 1.75), (math.radians(90), 0, 0.25), (1.0,) * 3, [brass])
+    ball = bpy.data.objects.new("Chrome ball, an empty", None)
+    bpy.context.scene.collection.objects.link(ball)
+    ball.location, ball.scale = (0.25, -1.75, 0.32), (0.32,) * 3
+    ball.rayscope.material, ball.rayscope.kind = material("Chrome", (0.9, 0.9, 0.92), 0.0, metallic=1.0), "sphere"
+
+    lamp("AREA", "Window", (-4.5, -4.0, 5.5), (0, 0.4, 0.5), 420, (1.0, 0.95, 0.88), shape="RECTANGLE", size=1.6,
+         size_y=1.2)
+    lamp("POINT", "Lamp", (4.5, -3.0, 3.5), energy=140, colour=(0.85, 0.92, 1.0), shadow_soft_size=0.05)
+    lamp("SUN", "Daylight", (0, 0, 6), (1.5, 1.2, 0), 0.6, (1.0, 0.95, 0.85), angle=math.radians(1))
+    camera((0.3, -7.6, 3.7), (0.2, 0.25, 0.75), 35)
+
+
+SCENES = (still_life, forest, teapot_in_a_stadium, interior, csg)
 
 
 def main(folder):
     folder.mkdir(parents=True, exist_ok=True)
+    register_properties()
     for scene in SCENES:
         scene()
         save(folder, scene.__name__)

@@ -57,7 +57,10 @@ class Booleans:
                 self._trees[key] = self._tree(obj.original)
             except _Refused as reason:
                 self._trees[key] = None
-                self.notices.add(obj.name, f"its Boolean modifiers are not traced as CSG: {reason} Blender's own Boolean mesh was used.")
+                self.notices.add(
+                    obj.name,
+                    f"its Boolean modifiers are not traced as CSG: {reason} Blender's own Boolean mesh was used.",
+                )
         return self._trees[key]
 
     def _tree(self, obj):
@@ -128,8 +131,14 @@ class Booleans:
             found = [modifier.object] if modifier.object else []
         else:
             if modifier.operation == "INTERSECT" and modifier.solver in {"FAST", "FLOAT"}:
-                raise _Refused(f"{modifier.name}: the solver {modifier.solver.title()} cannot intersect with a collection.")
-            found = [o for o in modifier.collection.all_objects if o.type == "MESH" and o != owner] if modifier.collection else []
+                raise _Refused(
+                    f"{modifier.name}: the solver {modifier.solver.title()} cannot intersect with a collection."
+                )
+            found = (
+                [o for o in modifier.collection.all_objects if o.type == "MESH" and o != owner]
+                if modifier.collection
+                else []
+            )
         if not found:
             what = "an object" if modifier.operand_type == "OBJECT" else "a collection with meshes"
             raise _Refused(f"the modifier {modifier.name} has no operand; give it {what}.")
@@ -144,16 +153,23 @@ class Booleans:
         if kind != "none":
             return unit_solid(evaluated, matrix, slot=taken(0), name=evaluated.name)
         mesh, _ = read_mesh(source.data)
-        used = np.unique(np.minimum(mesh.slots, len(reads) - 1)) if mesh.slots is not None and len(mesh) else np.zeros(1, int)
+        used = (
+            np.unique(np.minimum(mesh.slots, len(reads) - 1))
+            if mesh.slots is not None and len(mesh)
+            else np.zeros(1, int)
+        )
         used = sorted({taken(int(s)) for s in used})
         if len(used) > 1:
             raise _Refused(f"{evaluated.name} has {len(used)} materials, and a solid of a tree has one.")
         if any(r.material.texture or r.material.vertex_colours for r in reads):
-            raise _Refused(f"{evaluated.name} has a material with a texture or colour attribute, and the solids of a tree are not unwrapped.")
+            raise _Refused(
+                f"{evaluated.name} has a textured or vertex-coloured material; the solids of a tree have no UV map."
+            )
         corners = mesh.vertices[mesh.triangles]
         middle = mesh.vertices.mean(axis=0) if len(mesh) else 0.0
-        if np.einsum("ij,ij->", corners[:, 0] - middle, np.cross(corners[:, 1] - middle, corners[:, 2] - middle)) < 0.0 \
-                and not solids.mesh_fault(mesh):
+        if np.einsum(
+            "ij,ij->", corners[:, 0] - middle, np.cross(corners[:, 1] - middle, corners[:, 2] - middle)
+        ) < 0.0 and not solids.mesh_fault(mesh):
             raise _Refused(f"{evaluated.name} is inside out; turn its faces with Mesh > Normals > Recalculate Outside.")
         return solids.mesh(mesh, matrix, slot=used[0], name=evaluated.name)
 
@@ -162,7 +178,9 @@ class Booleans:
         if not self.has(obj):
             return self.materials.of(obj.evaluated_get(self.depsgraph))
         # Its own: Blender's Booleans add those of the operands to the evaluated object's.
-        return self.materials.of_slots([s.material and s.material.evaluated_get(self.depsgraph) for s in obj.material_slots])
+        return self.materials.of_slots(
+            [s.material and s.material.evaluated_get(self.depsgraph) for s in obj.material_slots]
+        )
 
     def _matrix(self, obj):
         return np.array(obj.evaluated_get(self.depsgraph).matrix_world, float)
@@ -177,11 +195,19 @@ class Booleans:
             raise _Refused("its scale is zero along an axis.") from None
 
     def _note_smooth(self, obj, solid):
-        smooth = sorted({leaf.name for leaf in solids.flatten(solid)[1]
-                         if leaf.kind == "mesh" and leaf.values["mesh"].corner_normals is not None})
+        smooth = sorted(
+            {
+                leaf.name
+                for leaf in solids.flatten(solid)[1]
+                if leaf.kind == "mesh" and leaf.values["mesh"].corner_normals is not None
+            }
+        )
         if smooth:
-            self.notices.add(obj.name, f"shaded smooth, but as part of a CSG tree seen with flat faces: {', '.join(smooth)}. "
-                             "Tag them as a Rayscope primitive, or switch off CSG from Booleans.")
+            self.notices.add(
+                obj.name,
+                f"shaded smooth, but as part of a CSG tree seen with flat faces: {', '.join(smooth)}. "
+                "Tag them as a Rayscope primitive, or switch off CSG from Booleans.",
+            )
 
 
 def _transfers(modifier):
@@ -202,6 +228,7 @@ class _Slots:
 
     def sharing(self, base, taken, operand, transfers):
         """Slot of an operand -> slot of the tree, as Blender's Boolean modifiers map them."""
+
         def slot(k):
             read = operand[min(k, len(operand) - 1)]
             own = next((taken(i) for i, r in enumerate(base) if r is read), None)
@@ -212,4 +239,5 @@ class _Slots:
             if not any(r is read for r in self.reads):
                 self.reads.append(read)
             return next(i for i, r in enumerate(self.reads) if r is read)
+
         return slot

@@ -92,7 +92,7 @@ class Geometries:
             if self._csg and (tree := self._booleans.of(obj)):
                 return tree
             if tagged:
-                self.notices.add(obj.name, "its primitive is replaced by Blender's Boolean of the mesh that stands in for it.")
+                self.notices.add(obj.name, "Blender's Boolean of the mesh that stands in for its primitive was used.")
             tagged = False
         own = self.materials.of(obj)
         return self._primitives.of(obj) if tagged else self._mesh(obj, own), own

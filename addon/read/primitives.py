@@ -55,18 +55,26 @@ class Primitives:
     def _polygons(self, obj):
         """One polygon a face of the evaluated mesh."""
         if obj.type != "MESH":
-            self.notices.add(obj.name, "it is tagged as a polygon but has no faces; it was left out. Tag a mesh, or choose another kind.")
+            self.notices.add(
+                obj.name,
+                "it is tagged as a polygon but has no faces; it was left out. Tag a mesh, or choose another kind.",
+            )
             return Shapes([])
         key = obj.data.as_pointer()
         if key not in self._shapes:
             points, normals, start, slots = face_corners(obj.data)
             faces = list(zip(start[:-1].tolist(), start[1:].tolist(), slots.tolist()))
-            self._shapes[key] = Shapes([polygon(points[a:b], None if normals is None else normals[a:b], slot=slot) for a, b, slot in faces],
-                                       obj.data.name)
+            self._shapes[key] = Shapes(
+                [polygon(points[a:b], None if normals is None else normals[a:b], slot=slot) for a, b, slot in faces],
+                obj.data.name,
+            )
         return self._shapes[key]
 
     def _note_modifiers(self, obj):
         names = [m.name for m in obj.modifiers if m.type not in {"BOOLEAN", "NODES"}]
         if names:
-            self.notices.add(obj.name, f"it is traced as a {obj.rayscope.kind}; its modifiers ({', '.join(names)}) change only the mesh "
-                             "that stands in for it.")
+            self.notices.add(
+                obj.name,
+                f"it is traced as a {obj.rayscope.kind}; its modifiers ({', '.join(names)}) change only the mesh "
+                "that stands in for it.",
+            )

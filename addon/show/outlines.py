@@ -25,7 +25,9 @@ def segments(kind, capped=True, ratio=0.0):
         return np.concatenate([_circle(axis=axis) for axis in range(3)])
     if kind == "box":
         low, high = (np.column_stack([square, np.full(4, z)]) for z in (-1.0, 1.0))
-        return np.concatenate([_between(low, np.roll(low, 1, axis=0)), _between(high, np.roll(high, 1, axis=0)), _between(low, high)])
+        return np.concatenate(
+            [_between(low, np.roll(low, 1, axis=0)), _between(high, np.roll(high, 1, axis=0)), _between(low, high)]
+        )
     if kind == "pyramid":
         low = np.column_stack([square, np.zeros(4)])
         return np.concatenate([_between(low, np.roll(low, 1, axis=0)), _between(low, [(0.0, 0.0, 1.0)] * 4)])
@@ -34,7 +36,9 @@ def segments(kind, capped=True, ratio=0.0):
         foot = np.array([(1, 0, 0), (0, 1, 0), (-1, 0, 0), (0, -1, 0)], float)
         head = foot * top + (0.0, 0.0, 1.0)
         rings = [_circle(), _circle(top, 1.0)] if top > 0.0 else [_circle()]
-        cross = [_between(foot[:2], foot[2:]), _between(head[:2], head[2:])] if capped else []  # a closed end is crossed
+        cross = (
+            [_between(foot[:2], foot[2:]), _between(head[:2], head[2:])] if capped else []
+        )  # a closed end is crossed
         return np.concatenate([*rings, _between(foot, head), *cross])
     return np.zeros((0, 3))
 
@@ -72,8 +76,9 @@ _gpu = {}  # the batch, its shader, and the view layer that it shows
 
 
 def draw(depsgraph, layer, changed):
-    """Draw into the 3D view that is being drawn; the lines are made anew for another view layer, and when something has changed."""
+    """Draw into the 3D view that is being drawn; another view layer, or a change, has the lines made anew."""
     import gpu
+
     if changed or _gpu.get("layer") != layer:
         _gpu["layer"] = layer
         positions, colours = lines(depsgraph)

@@ -14,9 +14,13 @@ class RAYSCOPE_OT_add_primitive(bpy.types.Operator, AddObjectHelper):
     bl_description = "Add a shape that is traced exactly, not as facets; its mesh stands in for it in the viewport"
     bl_options = {"REGISTER", "UNDO"}
 
-    kind: EnumProperty(name="Kind", description="What is added", default="sphere", items=[(*row, i) for i, row in enumerate(KINDS[1:])])
+    kind: EnumProperty(
+        name="Kind", description="What is added", default="sphere", items=[(*row, i) for i, row in enumerate(KINDS[1:])]
+    )
     capped: BoolProperty(name="Capped", description="Close both ends with discs", default=True)
-    ratio: FloatProperty(name="Top Radius", description="Radius at z = 1; the base has radius 1", default=0.0, min=0.0, max=1.0)
+    ratio: FloatProperty(
+        name="Top Radius", description="Radius at z = 1; the base has radius 1", default=0.0, min=0.0, max=1.0
+    )
 
     @classmethod
     def poll(cls, context):
@@ -24,6 +28,7 @@ class RAYSCOPE_OT_add_primitive(bpy.types.Operator, AddObjectHelper):
 
     def execute(self, context):
         from ..stand_ins import stand_in
+
         obj = object_data_add(context, stand_in(self.kind, self.capped, self.ratio), operator=self)
         obj.rayscope.capped, obj.rayscope.ratio, obj.rayscope.kind = self.capped, self.ratio, self.kind
         return {"FINISHED"}
@@ -41,20 +46,32 @@ _databases = []  # Blender keeps no copy of an enum's texts
 def _names(self, context):
     if not _databases:
         from ...core.scene.spd import DATABASES
-        _databases.extend((name, name.title(), f"Size factor {row.size} is customary; {row.largest} at most") for name, row in DATABASES.items())
+
+        _databases.extend(
+            (name, name.title(), f"Size factor {row.size} is customary; {row.largest} at most")
+            for name, row in DATABASES.items()
+        )
     return _databases
 
 
 class RAYSCOPE_OT_add_spd(bpy.types.Operator):
     bl_idname = "rayscope.add_spd"
     bl_label = "SPD Scene"
-    bl_description = ("Add a scene of the Standard Procedural Databases (Haines 1987), made of instances of primitives. "
-                      "Its camera and its background become the scene's")
+    bl_description = (
+        "Add a scene of the Standard Procedural Databases (Haines 1987), made of instances of primitives. "
+        "Its camera and its background become the scene's"
+    )
     bl_options = {"REGISTER", "UNDO"}
 
     database: EnumProperty(name="Scene", description="Which of the databases", items=_names)
-    size: IntProperty(name="Size Factor", description="How far the scene is subdivided; 0 is its customary size, of some thousand primitives. "
-                      "Each step may multiply them by ten", default=0, min=0, soft_max=12)
+    size: IntProperty(
+        name="Size Factor",
+        description="How far the scene is subdivided; 0 is its customary size, of some thousand primitives. "
+        "Each step may multiply them by ten",
+        default=0,
+        min=0,
+        soft_max=12,
+    )
 
     @classmethod
     def poll(cls, context):
@@ -63,6 +80,7 @@ class RAYSCOPE_OT_add_spd(bpy.types.Operator):
     def execute(self, context):
         from ...core.scene.spd import spd
         from ..write_scene import write_scene
+
         try:
             scene = spd(self.database, self.size or None)
         except RayscopeError as error:

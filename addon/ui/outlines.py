@@ -23,8 +23,11 @@ def draw():
         _state["any"] = any(o.type == "EMPTY" and o.rayscope.kind != "none" for o in bpy.data.objects)
     if _state["any"]:
         from ..show import outlines
+
         context = bpy.context
-        outlines.draw(context.evaluated_depsgraph_get(), (context.scene.session_uid, context.view_layer.name), _state["changed"])
+        outlines.draw(
+            context.evaluated_depsgraph_get(), (context.scene.session_uid, context.view_layer.name), _state["changed"]
+        )
     elif outlines := show.loaded("outlines"):
         outlines.release()
     _state["changed"] = False

@@ -13,8 +13,13 @@ KINDS = (
     ("cylinder", "Cylinder", "Radius 1 about the z axis, from z = 0 to z = 1", "MESH_CYLINDER"),
     ("cone", "Cone", "Radius 1 at z = 0, and as told at z = 1: a cone, or the frustum of one", "MESH_CONE"),
     ("pyramid", "Pyramid", "Base from (-1, -1, 0) to (1, 1, 0), apex (0, 0, 1)", "CONE"),
-    ("polygon", "Polygon", "Each face of the mesh is a planar polygon of its own; it need not be convex, and a hole is reached by a bridge: "
-     "two edges that run along each other", "MESH_PLANE"),
+    (
+        "polygon",
+        "Polygon",
+        "Each face of the mesh is a planar polygon of its own. It may be concave, and a hole is reached by a bridge: "
+        "two edges that run along each other",
+        "MESH_PLANE",
+    ),
 )
 #: Values that kinds need, by their names here and in the core.
 VALUES = {"cylinder": ("capped",), "cone": ("capped", "ratio")}
@@ -22,19 +27,38 @@ VALUES = {"cylinder": ("capped",), "cone": ("capped", "ratio")}
 
 def _changed(self, context):
     from .. import stand_ins
+
     stand_ins.refresh(self.id_data)
 
 
 class RAYSCOPE_PG_primitive(bpy.types.PropertyGroup):
     kind: EnumProperty(
-        name="Kind", description="What Rayscope traces for this object and each of its instances: the shape itself, under the object's "
-        "transform. The mesh only stands in for it in the viewport", default="none", update=_changed,
-        items=[(*row, number) for number, row in enumerate(KINDS)])
-    capped: BoolProperty(name="Capped", description="Close both ends with discs; only what is closed can take part in Booleans",
-                         default=True, update=_changed)
-    ratio: FloatProperty(name="Top Radius", description="Radius at z = 1; the base has radius 1, and 0 gives a cone with an apex",
-                         default=0.0, min=0.0, max=1.0, update=_changed)
-    material: PointerProperty(name="Material", description="Material of the primitive; an empty has no material slots", type=bpy.types.Material)
+        name="Kind",
+        description="What Rayscope traces for this object and its instances: the shape itself, under the object's "
+        "transform. The mesh only stands in for it in the viewport",
+        default="none",
+        update=_changed,
+        items=[(*row, number) for number, row in enumerate(KINDS)],
+    )
+    capped: BoolProperty(
+        name="Capped",
+        description="Close both ends with discs; only what is closed can take part in Booleans",
+        default=True,
+        update=_changed,
+    )
+    ratio: FloatProperty(
+        name="Top Radius",
+        description="Radius at z = 1; the base has radius 1, and 0 gives a cone with an apex",
+        default=0.0,
+        min=0.0,
+        max=1.0,
+        update=_changed,
+    )
+    material: PointerProperty(
+        name="Material",
+        description="Material of the primitive; an empty has no material slots",
+        type=bpy.types.Material,
+    )
 
 
 class Primitive:

@@ -1,4 +1,4 @@
-"""Boolean modifiers as CSG trees: the same silhouette and depth as Blender's own Boolean meshes, or a notice that says why not."""
+"""Boolean modifiers as CSG trees: silhouette and depth of Blender's own meshes, or a notice that says why not."""
 
 import bpy
 import numpy as np
@@ -73,7 +73,11 @@ def check(ours, blenders, hits, theirs):
     depth = theirs.t.reshape(SIZE, SIZE)
     around = np.stack([np.roll(expected, s, axis=a) for a in (0, 1) for s in (1, -1)])
     assert (around.any(axis=0) & ~around.all(axis=0) | ~differ).all()
-    off = np.where(hit & expected, np.abs(np.where(hit & expected, hits.t.reshape(SIZE, SIZE), 0.0) - np.where(expected, depth, 0.0)), 0.0)
+    off = np.where(
+        hit & expected,
+        np.abs(np.where(hit & expected, hits.t.reshape(SIZE, SIZE), 0.0) - np.where(expected, depth, 0.0)),
+        0.0,
+    )
     wrong = off > 1e-4 * np.median(depth[expected])
     assert wrong.sum() <= 1e-3 * expected.sum()  # a ray at an inner edge may see one or the other side of it
     normals = np.einsum("ij,ij->i", hits.normal, theirs.normal).reshape(SIZE, SIZE)[hit & expected & ~wrong]
@@ -85,15 +89,22 @@ def check(ours, blenders, hits, theirs):
 def test_one_operand(empty_scene, operation, solver):
     base = add("cube", "Base", rotation=(0.2, 0.1, 0.3), location=(1, 2, 3))
     base.scale = (1, 1.2, 0.9)
-    boolean(base, operation, add("uv_sphere", "Ball", hide=True, segments=24, ring_count=12, location=(1.5, 1.4, 3.6), rotation=(0.4, 0, 0)), solver)
+    boolean(
+        base,
+        operation,
+        add("uv_sphere", "Ball", hide=True, segments=24, ring_count=12, location=(1.5, 1.4, 3.6), rotation=(0.4, 0, 0)),
+        solver,
+    )
     check(*both())
 
 
 @pytest.mark.parametrize("operation", ["UNION", "INTERSECT", "DIFFERENCE"])
 def test_a_collection(empty_scene, operation):
     base = add("cube", "Base")
-    rods = [add("cylinder", f"Rod {k}", hide=True, vertices=20, radius=0.7, depth=3, rotation=turn)
-            for k, turn in enumerate([(0.1, 0, 0), (1.5, 0.1, 0.2), (0.1, 1.55, 0)])]
+    rods = [
+        add("cylinder", f"Rod {k}", hide=True, vertices=20, radius=0.7, depth=3, rotation=turn)
+        for k, turn in enumerate([(0.1, 0, 0), (1.5, 0.1, 0.2), (0.1, 1.55, 0)])
+    ]
     boolean(base, operation, collection_of(*rods))
     ours, *rest = both()
     assert len(flatten(ours.objects[0].geometry.solids[0])[1]) == 4
@@ -104,7 +115,16 @@ def test_a_stack_in_its_order(empty_scene):
     """Taking away and then adding is not adding and then taking away."""
     base = add("cube", "Base")
     ball = add("ico_sphere", "Ball", hide=True, subdivisions=3, radius=1.1, location=(0.1, -1, 1))
-    rod = add("cylinder", "Rod", hide=True, vertices=24, radius=0.3, depth=4, rotation=(0.02, 0.03, 0), location=(0.05, -0.7, 0))
+    rod = add(
+        "cylinder",
+        "Rod",
+        hide=True,
+        vertices=24,
+        radius=0.3,
+        depth=4,
+        rotation=(0.02, 0.03, 0),
+        location=(0.05, -0.7, 0),
+    )
     boolean(base, "DIFFERENCE", ball)
     boolean(base, "UNION", rod)
     one = both()
@@ -160,8 +180,12 @@ def test_a_tagged_operand_is_exact(empty_scene):
     cut = np.isfinite(hits.t) & (hits.part == 1)
     assert cut.sum() > 500
     lo, hi = blenders.bounds()
-    camera = Camera.look_at(0.5 * (lo + hi) + 4.0 * 0.5 * np.linalg.norm(hi - lo) * np.array((1.0, -1.4, 0.9)) / np.linalg.norm((1.0, -1.4, 0.9)),
-                            0.5 * (lo + hi), angle=0.52)
+    camera = Camera.look_at(
+        0.5 * (lo + hi)
+        + 4.0 * 0.5 * np.linalg.norm(hi - lo) * np.array((1.0, -1.4, 0.9)) / np.linalg.norm((1.0, -1.4, 0.9)),
+        0.5 * (lo + hi),
+        angle=0.52,
+    )
     x, y = (a.ravel() + 0.5 for a in np.meshgrid(np.arange(SIZE), np.arange(SIZE)))
     origins, directions = camera.rays(x, y, (SIZE, SIZE))
     points = (origins + np.where(np.isfinite(hits.t), hits.t, 0.0)[:, None] * directions)[cut]
@@ -176,27 +200,46 @@ def test_a_tagged_base_alone_is_analytic_and_its_tree_too(empty_scene):
     can = bpy.context.object
     boolean(can, "INTERSECT", add("cube", "Box", hide=True, location=(0.5, 0, 0.5)))
     ours, *_ = both()
-    assert [leaf.kind for leaf in flatten(ours.objects[0].geometry.solids[0])[1]] == ["cylinder", "mesh"] and not ours.notices
+    assert [leaf.kind for leaf in flatten(ours.objects[0].geometry.solids[0])[1]] == [
+        "cylinder",
+        "mesh",
+    ] and not ours.notices
     can.rayscope.capped = False
     scene = read()
     assert isinstance(scene.objects[0].geometry, Mesh)
-    assert any("encloses nothing" in n.text for n in scene.notices) and any("stands in" in n.text for n in scene.notices)
+    assert any("encloses nothing" in n.text for n in scene.notices) and any(
+        "stands in" in n.text for n in scene.notices
+    )
 
 
 def test_materials_are_those_of_blenders_mesh(empty_scene):
     """By both of the modifier's ways: of the base's slots, and of the operands."""
-    for mode, base_has, ball_has, expected in (("INDEX", "A", "B", "A"), ("INDEX", "AB", "B", "B"), ("TRANSFER", "A", "B", "B"),
-                                               ("TRANSFER", "AB", "", "A"), ("TRANSFER", "", "B", "B"), ("TRANSFER", "B", "AB", "A")):
+    for mode, base_has, ball_has, expected in (
+        ("INDEX", "A", "B", "A"),
+        ("INDEX", "AB", "B", "B"),
+        ("TRANSFER", "A", "B", "B"),
+        ("TRANSFER", "AB", "", "A"),
+        ("TRANSFER", "", "B", "B"),
+        ("TRANSFER", "B", "AB", "A"),
+    ):
         bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
         base = add("cube", "Base", base_has)
-        boolean(base, "DIFFERENCE", add("ico_sphere", "Ball", ball_has, hide=True, subdivisions=3, location=(1, -1, 1)), material_mode=mode)
+        boolean(
+            base,
+            "DIFFERENCE",
+            add("ico_sphere", "Ball", ball_has, hide=True, subdivisions=3, location=(1, -1, 1)),
+            material_mode=mode,
+        )
         ours, blenders, hits, theirs = both()
         seen = []
         for scene, h in ((ours, hits), (blenders, theirs)):
             obj = scene.objects[0]
             names = np.array([m.name for m in obj.materials])
-            slots = np.array([leaf.slot for leaf in flatten(obj.geometry.solids[0])[1]])[h.part] if scene is ours else (
-                np.zeros(len(h.t), int) if obj.geometry.slots is None else obj.geometry.slots[h.primitive])
+            slots = (
+                np.array([leaf.slot for leaf in flatten(obj.geometry.solids[0])[1]])[h.part]
+                if scene is ours
+                else (np.zeros(len(h.t), int) if obj.geometry.slots is None else obj.geometry.slots[h.primitive])
+            )
             seen.append(names[np.minimum(slots, len(names) - 1)])
         at = np.isfinite(hits.t) & np.isfinite(theirs.t)
         assert (seen[0] == seen[1])[at].mean() > 0.998, (mode, base_has, ball_has)
@@ -284,6 +327,7 @@ def test_an_open_mesh_is_refused(empty_scene):
     boolean(base, "DIFFERENCE", ball)
     assert not isinstance(read().objects[0].geometry, Mesh)
     import bmesh
+
     mesh = bmesh.new()
     mesh.from_mesh(ball.data)
     mesh.faces.ensure_lookup_table()
@@ -330,8 +374,11 @@ def test_other_reasons_to_refuse(empty_scene):
 
     _, ball, _ = start()
     two = bpy.data.meshes.new("Wedges")  # two tetrahedra that share an edge
-    two.from_pydata([(0, 0, 0), (0, 0, 1), (1, 0, 0), (1, 1, 0), (-1, 0, 0), (-1, -1, 0)], [],
-                    [(0, 2, 1), (0, 1, 3), (0, 3, 2), (1, 2, 3), (0, 4, 1), (0, 1, 5), (0, 5, 4), (1, 4, 5)])
+    two.from_pydata(
+        [(0, 0, 0), (0, 0, 1), (1, 0, 0), (1, 1, 0), (-1, 0, 0), (-1, -1, 0)],
+        [],
+        [(0, 2, 1), (0, 1, 3), (0, 3, 2), (1, 2, 3), (0, 4, 1), (0, 1, 5), (0, 5, 4), (1, 4, 5)],
+    )
     ball.data = two
     refused("not manifold", "Ball")
 

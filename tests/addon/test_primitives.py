@@ -18,8 +18,18 @@ from bl_ext.user_default.rayscope.core.scene.camera import Camera
 from bl_ext.user_default.rayscope.core.scene.solids import KINDS as CORE_KINDS
 
 SHAPES = [row[0] for row in KINDS[1:]]
-VARIANTS = [("sphere", {}), ("box", {}), ("cylinder", {}), ("cylinder", {"capped": False}), ("cone", {}), ("cone", {"ratio": 0.4}),
-            ("cone", {"ratio": 1.0}), ("cone", {"capped": False, "ratio": 0.5}), ("pyramid", {}), ("polygon", {})]
+VARIANTS = [
+    ("sphere", {}),
+    ("box", {}),
+    ("cylinder", {}),
+    ("cylinder", {"capped": False}),
+    ("cone", {}),
+    ("cone", {"ratio": 0.4}),
+    ("cone", {"ratio": 1.0}),
+    ("cone", {"capped": False, "ratio": 0.5}),
+    ("pyramid", {}),
+    ("polygon", {}),
+]
 
 
 def read(**more):
@@ -65,7 +75,8 @@ def test_added_from_the_menu_a_stand_in_looks_like_what_is_traced(empty_scene, k
     origins, directions = rays_at(analytic)
     ours, theirs = (build(s, "bvh").closest(origins, directions) for s in (analytic, facets))
     hit, hit_facets = np.isfinite(ours.t), np.isfinite(theirs.t)
-    # Facets lie inside of round shapes, by 1 - cos(pi / 32) of the radius, and exactly on flat ones; open ones can be seen through.
+    # Facets lie inside of round shapes, by 1 - cos(pi / 32) of the radius, and exactly on flat ones; open ones can be
+    # seen through.
     round_ = kind in ("sphere", "cylinder", "cone")
     assert hit.sum() > 300 and (values.get("capped") is False or not (hit_facets & ~hit).any())
     assert (hit != hit_facets).mean() < (0.02 if round_ else 1e-9)
@@ -114,7 +125,8 @@ def test_hidden_ones_are_not_traced(empty_scene):
 
 def test_a_polygon_is_each_face_concave_or_with_a_hole_by_a_bridge(empty_scene):
     mesh = bpy.data.meshes.new("Frame and L")
-    # A square with a square hole, bridged from corner to corner; corners of the bridge twice. And an L, with the second material.
+    # A square with a square hole, bridged from corner to corner; corners of the bridge twice. And an L, with the
+    # second material.
     frame = [(-2, -2), (2, -2), (2, 2), (-2, 2), (-2, -2), (-1, -1), (-1, 1), (1, 1), (1, -1), (-1, -1)]
     ell = [(4, -2), (7, -2), (7, -1), (5, -1), (5, 2), (4, 2)]
     mesh.from_pydata([(x, y, 0.0) for x, y in frame + ell], [], [tuple(range(10)), tuple(range(10, 16))])
@@ -125,8 +137,19 @@ def test_a_polygon_is_each_face_concave_or_with_a_hole_by_a_bridge(empty_scene):
     scene = read()
     assert not scene.notices and [s.kind for s in scene.objects[0].geometry.solids] == ["polygon"] * 2
     assert [s.slot for s in scene.objects[0].geometry.solids] == [0, 1]
-    x, y = np.array([(0, 0, False), (1.5, 0, True), (-1.5, 1.5, True), (0.9, 0.9, False), (4.5, 1, True), (6, 0, False), (6, -1.5, True), (3, 0, False),
-                     (-1.9, -1.7, True)])[:, :2].T
+    x, y = np.array(
+        [
+            (0, 0, False),
+            (1.5, 0, True),
+            (-1.5, 1.5, True),
+            (0.9, 0.9, False),
+            (4.5, 1, True),
+            (6, 0, False),
+            (6, -1.5, True),
+            (3, 0, False),
+            (-1.9, -1.7, True),
+        ]
+    )[:, :2].T
     expected = [False, True, True, False, True, False, True, False, True]
     hits = build(scene, "bvh").closest(np.stack([x, y, np.full(9, 5.0)], 1), np.tile((0.0, 0.0, -1.0), (9, 1)))
     assert np.isfinite(hits.t).tolist() == expected and np.allclose(hits.t[expected], 4.0)
@@ -179,13 +202,18 @@ def test_outlines_lie_on_the_shape(empty_scene, kind, values):
     positions = outlines.segments(kind, values.get("capped", True), values.get("ratio", 0.0))
     assert len(positions) >= 16 and len(positions) % 2 == 0
     x, y, z = positions.T
-    off = {"sphere": np.abs(np.linalg.norm(positions, axis=1) - 1.0), "box": np.abs(np.abs(positions).max(axis=1) - 1.0),
-           "pyramid": np.minimum(np.abs(np.maximum(np.abs(x), np.abs(y)) + z - 1.0), np.abs(z))}.get(kind)
+    off = {
+        "sphere": np.abs(np.linalg.norm(positions, axis=1) - 1.0),
+        "box": np.abs(np.abs(positions).max(axis=1) - 1.0),
+        "pyramid": np.minimum(np.abs(np.maximum(np.abs(x), np.abs(y)) + z - 1.0), np.abs(z)),
+    }.get(kind)
     if off is None:
         top = 1.0 if kind == "cylinder" else values.get("ratio", 0.0)
         off = np.abs(np.hypot(x, y) - (1.0 + (top - 1.0) * z))
     assert off.max() < 1e-12
-    assert positions.min(axis=0)[2] == (-1.0 if kind in ("sphere", "box") else 0.0) and positions.max(axis=0)[2] == pytest.approx(1.0)
+    assert positions.min(axis=0)[2] == (-1.0 if kind in ("sphere", "box") else 0.0) and positions.max(axis=0)[
+        2
+    ] == pytest.approx(1.0)
 
 
 def test_outlines_of_empties_and_of_their_instances(empty_scene):
@@ -241,10 +269,19 @@ def test_the_tag_is_kept_in_the_file(empty_scene, tmp_path):
 def test_the_command_reads_tags_and_settings_though_the_extension_is_not_enabled(empty_scene, tmp_path):
     tagged("cone", "Kept", ratio=0.25)
     bpy.ops.mesh.primitive_cube_add()
-    bpy.context.object.modifiers.new("Boolean", "BOOLEAN").object = bpy.data.objects.new("Ball", bpy.data.meshes.new("None"))
+    bpy.context.object.modifiers.new("Boolean", "BOOLEAN").object = bpy.data.objects.new(
+        "Ball", bpy.data.meshes.new("None")
+    )
     bpy.context.scene.rayscope.csg = False
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "kept.blend"))
-    code = ("import bpy, os, sys; from rayscope.addon.open_file import open_file; scene = open_file(sys.argv[1]); "
-            "print([(o.name, type(o.geometry).__name__) for o in scene.objects], [n.name for n in scene.notices], flush=True); os._exit(0)")
-    done = subprocess.run([sys.executable, "-c", code, str(tmp_path / "kept.blend")], text=True, capture_output=True, timeout=60)
-    assert "[('Kept', 'Shapes'), ('Cube', 'Mesh')] ['Scene']" in done.stdout, done  # without a camera, and no word of the Boolean
+    code = (
+        "import bpy, os, sys; from rayscope.addon.open_file import open_file; scene = open_file(sys.argv[1]); "
+        "print([(o.name, type(o.geometry).__name__) for o in scene.objects], [n.name for n in scene.notices], flush=1);"
+        "os._exit(0)"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code, str(tmp_path / "kept.blend")], text=True, capture_output=True, timeout=60
+    )
+    assert "[('Kept', 'Shapes'), ('Cube', 'Mesh')] ['Scene']" in done.stdout, (
+        done
+    )  # without a camera, and no word of the Boolean
