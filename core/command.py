@@ -541,6 +541,36 @@ def inspect_verb(call):
     return Outcome(inspect.text(result, warned), record)
 
 
+# --- error ------------------------------------------------------------------------------------------------------------
+
+def error_options(sub):
+    sub.add_argument("--out", metavar="DIR", required=True, help="write the table, the plots and a page with all of it there")
+    sub.add_argument("--seconds", metavar="S", type=whole(1, 1_000_000), default=120, help="about how long it may take; decides how fine the sweep is")
+    sub.add_argument("--size", metavar="WxH", type=picture_size, default=(96, 72), help="pixels")
+    sub.add_argument("--seed", type=whole(0, 2**31 - 3), default=0)
+
+
+def error_verb(call):
+    """Error against run time."""
+    from .lab import error_time
+
+    report.folder(call.out)
+    scene = call.scene(call.size)
+    with stoppable() as progress:
+        result = error_time.error_time(scene, call.size, call.seconds, call.seed, progress=progress, say=say)
+    record = report.record("error", scene, call.seed, {"size": call.size, "seconds": call.seconds}, **result)
+    files, note = error_time.write(result, call.out, f"{scene.name}, {call.size[0]} x {call.size[1]} pixels")
+    path = Path(call.out) / "error.json"
+    path.write_text(report.to_json(record) + "\n", encoding="utf-8")
+    if note:
+        say(note)
+    if result["stopped"]:
+        say("rayscope error: stopped; what was measured has been kept.")
+    text = [report.table(result["rows"], error_time.COLUMNS), "", *result["words"], "", *(f"left out: {line}" for line in result["left_out"]),
+            *(f"written: {f}" for f in (*files, path))]
+    return Outcome("\n".join(text), record, FAILED if result["stopped"] else DONE)
+
+
 @dataclass(frozen=True)
 class Verb:
     """One verb.
@@ -568,6 +598,7 @@ VERBS = {
     "compare": Verb("run techniques on the same rays; table, CSV, JSON, plots", compare_verb, compare_options),
     "bounds": Verb("what bounding volumes are worth, object by object", bounds_verb, bounds_options),
     "motion": Verb("refit trees after motion, against new ones; what the order of insertion does", motion_verb, motion_options),
+    "error": Verb("error against run time, for each setting that the scene has something for", error_verb, error_options),
     "bench": Verb("measure against mathutils' BVHTree and Embree", bench_verb, bench_options, scene=False),
     "stability": Verb("run techniques on stiff and extreme cases against exact arithmetic", stability_verb, stability_options, scene=False),
     "needs": Verb("say what the scene needs, what is left out and why", needs_verb, needs_options),

@@ -1,0 +1,399 @@
+"""Error against run time: what each setting of the tracer costs and how wrong its picture is (a work-precision diagram).
+
+Every knob that the scene has something for is swept, each setting traced several times, turn by turn with all others.
+The reference is a picture with at least `FINER` times the samples of the finest setting, in two halves with different
+random numbers: half their difference is its own error, below which nothing can be told apart.
+"""
+
+import base64
+import html
+import math
+import time
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from ..catalogue import build, techniques
+from ..errors import Cancelled, MissingPackageError, SceneError
+from ..rendering import trace
+from . import report
+from .picture_error import MEASURES, STEP, displayed, errors
+
+#: The reference has so many times the samples of the finest setting.
+FINER = 16
+#: Cost of the whole run for each sample a pixel of the finest setting: the reference, the counting and the timed runs.
+RUNS = FINER + 30
+#: Samples a pixel that are worth sweeping up to.
+MOST, FEWEST = 1024, 2
+#: Points measured however little time there is.
+FEWEST_POINTS = 4
+#: Timed runs of each setting.
+REPEATS = 3
+#: What ends the paths in all pictures that are not about that, without a bias.
+UNBIASED = {"depth": 200, "threshold": 0.003, "roulette": True}
+COLUMNS = ("curve", "setting", "T", "T_worst", "runs", "rays", "tests", *MEASURES, "verdict")
+
+
+@dataclass
+class Setting:
+    """One point of a curve.
+
+    Attributes
+    ----------
+    curve, label : str
+    knob : str
+        Settings of one knob are judged against each other: they differ in it alone.
+    options : dict
+        Keywords of :func:`~rayscope.core.trace`.
+    scene : int
+        0: as it is; n: its curved solids as meshes, n segments around.
+    times : list of float
+        Seconds of the timed runs, tracing alone.
+    rays, tests : int
+        Of all kinds; intersection tests ray x primitive.
+    error : dict
+        See :func:`~.picture_error.errors`.
+    verdict : str
+    """
+
+    curve: str
+    label: str
+    knob: str
+    options: dict
+    scene: int = 0
+    times: list = field(default_factory=list)
+    rays: int = 0
+    tests: int = 0
+    error: dict = field(default_factory=dict)
+    verdict: str = ""
+
+    def row(self):
+        """As a row of the table."""
+        return {
+            "curve": self.curve,
+            "setting": self.label,
+            "T": min(self.times),
+            "T_worst": max(self.times),
+            "runs": len(self.times),
+            "times": list(self.times),
+            "rays": self.rays,
+            "tests": self.tests,
+            **self.error,
+            "verdict": self.verdict,
+            "options": self.options,
+        }
+
+
+def error_time(scene, size=(96, 72), seconds=120.0, seed=0, technique="bvh", progress=None, say=lambda line: None):
+    """Sweep all knobs that a scene has something for.
+
+    Parameters
+    ----------
+    scene : Scene
+        With a camera.
+    size : (int, int)
+    seconds : float
+        About how long it may take: decides how many samples the finest settings have.
+    seed : int
+    technique : str
+    progress : callable, optional
+        Called as ``progress(fraction)``; stops the run by raising Cancelled. What was measured by then is kept, once
+        there is a reference.
+    say : callable
+        Called with a line of text now and then.
+
+    Returns
+    -------
+    dict
+        rows : list of dict, a setting each, with the keys `COLUMNS`, ``times`` and ``options``; floor : float, the
+        reference's own RMSE; reference : dict; left_out : list of str; words : list of str; stopped : bool.
+
+    Raises
+    ------
+    SceneError
+        Without anything to trace, or without a camera.
+    Cancelled
+        When stopped before there was a reference.
+    """
+    if not scene.n_primitives:
+        raise SceneError(f"{scene.name}: there is nothing to trace: no object with a surface. Add a mesh, or check what is hidden in renders.")
+    sweep = _Sweep(scene, size, seconds, seed, technique, progress, say)
+    return sweep.run()
+
+
+class _Sweep:
+    """The run of :func:`error_time`."""
+
+    def __init__(self, scene, size, seconds, seed, technique, progress, say):
+        self.size, self.seconds, self.seed, self.technique, self.progress, self.say = size, seconds, seed, technique, progress, say
+        self.scenes, self.indices = {0: scene}, {0: build(scene, technique)}
+        self.began = time.perf_counter()
+        self.full = UNBIASED if any(m.reflects or m.transparent for m in scene.used_materials()) else {"depth": 0}
+        self.done, self.total = 0.0, 1.0
+
+    def run(self):
+        """See :func:`error_time`."""
+        cost = self._cost_of_a_sample()
+        finest = 2 ** int(math.log2(min(max(self.seconds / (cost * RUNS), FEWEST), MOST)))
+        settings, left_out = self._settings(finest)
+        # In samples a pixel: for the progress.
+        work = [self._work(s, finest) for s in settings]
+        self.total = FINER * finest + (1.5 + REPEATS) * sum(work)
+        self.say(f"{len(settings)} settings up to {finest} samples a pixel; reference with {FINER * finest}")
+        halves = [self._traced({**self.full, "samples": FINER * finest // 2}, self.seed + 1 + k, work=FINER * finest / 2) for k in (0, 1)]
+        images = [np.asarray(h.image, float) for h in halves]
+        reference = 0.5 * (images[0] + images[1])
+        floor = 0.5 * math.sqrt(np.mean((displayed(images[0]) - displayed(images[1])) ** 2))
+        stopped = False
+        try:
+            self._measure(settings, work, reference)
+            if self.progress:
+                self.progress(1.0)
+        except Cancelled:
+            stopped = True
+        missing = [s for s in settings if not s.times]
+        settings = [s for s in settings if s.times]
+        for s in missing:
+            why = "stopped before" if stopped else "no time was left"
+            left_out.append(f"{s.curve}, {s.label}: {why}.")
+        words = _judged(settings, floor)
+        return {
+            "rows": [s.row() for s in settings],
+            "floor": floor,
+            "reference": {"samples": FINER * finest, "options": self.full, "seeds": [self.seed + 1, self.seed + 2],
+                          "T": sum(h.figures["T_R"] for h in halves)},
+            "left_out": left_out,
+            "words": words,
+            "stopped": stopped,
+        }
+
+    def _cost_of_a_sample(self):
+        """Seconds of one sample of all pixels."""
+        self._traced({**self.full, "samples": 1}, self.seed, work=0)  # what is imported or built at first use
+        return max(self._traced({**self.full, "samples": 2}, self.seed, work=0).figures["T_R"] / 2.0, 1e-4)
+
+    def _traced(self, options, seed, scene=0, count=False, work=0.0):
+        """A picture; raises Cancelled when stopped."""
+        def progress(fraction):
+            if self.progress:
+                self.progress(min(1.0, (self.done + fraction * work) / self.total))
+
+        result = trace(self.scenes[scene], index=self.indices[scene], size=self.size, seed=seed, count=count, progress=progress, **options)
+        if result.cancelled:
+            raise Cancelled("stopped.")
+        self.done += work
+        return result
+
+    def _settings(self, finest):
+        """All settings, and what was left out and why."""
+        scene, left_out, settings = self.scenes[0], [], []
+        materials = scene.used_materials()
+
+        def curve(knob, name, points, **base):
+            settings.extend(Setting(name, label, knob, {**self.full, **base, **options}) for label, options in points)
+
+        doubling = [2**k for k in range(int(math.log2(finest)) + 1)]
+        curve("antialiasing", "samples", [(f"{n} samples", {"samples": n}) for n in doubling if n > 1])
+        levels = int(math.log(finest, 4) + 1e-9)
+        if levels >= 1:
+            for way in ("corners", "variance"):
+                base = {"antialiasing": way, "aa_level": levels}
+                curve("antialiasing", f"{way}, 4^{levels} samples at most",
+                      [(f"aa_threshold {t:g}", {"aa_threshold": t}) for t in (0.3, 0.1, 0.03, 0.01)], **base)
+        else:
+            left_out.append("adaptive antialiasing: it needs 4 samples a pixel; there is time for fewer. Give more --seconds, or a smaller --size.")
+        some = max(finest // 4, 2)
+        if any(m.reflects for m in materials):
+            curve("depth", f"maximum depth, {some} samples",
+                  [(f"depth {d}", {"depth": d, "threshold": 0.0, "roulette": False}) for d in (0, 1, 2, 4, 6)], samples=some)
+            for roulette in (False, True):
+                curve("depth", f"adaptive depth{' with roulette' if roulette else ''}, {some} samples",
+                      [(f"threshold {t:g}", {"threshold": t, "roulette": roulette}) for t in (0.3, 0.1, 0.03, 0.01)], samples=some)
+        else:
+            left_out.append("maximum depth, adaptive depth: the scene has no mirrors and no glass.")
+        if any(light.has_extent and any(light.colour) for light in scene.lights):
+            few = max(finest // 8, 2)
+            curve("shadows", f"shadow rays to each light, {few} samples",
+                  [(f"{n} shadow rays", {"light_samples": n}) for n in (1, 2, 4, 8) if n * few <= 2 * finest], samples=few)
+        else:
+            left_out.append("shadow rays to each light: no light of the scene has an extent.")
+        self._tessellations(settings, left_out, finest)
+        left_out.append("float32 against float64: the tracer computes in float64 alone.")
+        there = {row.name for row in techniques()}
+        for name in ("cones", "pyramids", "beams"):
+            if name not in there:
+                left_out.append(f"{name}: this version has no such technique.")
+        return settings, left_out
+
+    def _tessellations(self, settings, left_out, finest):
+        """Settings with curved solids as meshes."""
+        from .tessellate import curved, tessellated
+
+        if not curved(self.scenes[0]):
+            left_out.append("tessellation: the scene has no sphere, cylinder or cone by itself.")
+            return
+        for n in (8, 16, 32, 64):
+            self.scenes[n] = tessellated(self.scenes[0], n)
+            self.indices[n] = build(self.scenes[n], self.technique)
+            settings.append(Setting(f"tessellation, {finest} samples", f"{n} segments", "tessellation", {**self.full, "samples": finest}, scene=n))
+
+    @staticmethod
+    def _work(setting, finest):
+        """Cost of a setting, roughly, in samples a pixel."""
+        o = setting.options
+        if o.get("antialiasing", "uniform") != "uniform":
+            return 1.0 + 0.5 * 4 ** o["aa_level"]
+        return o["samples"] * (1.0 + 0.5 * (o.get("light_samples", 1) - 1))
+
+    def _measure(self, settings, work, reference):
+        """Trace all settings: once to count, then turn by turn for the times, as often as there is time."""
+        order = sorted(range(len(settings)), key=lambda i: work[i])
+        spent = {}
+        for turn in range(1 + REPEATS):
+            for place, i in enumerate(order):
+                setting = settings[i]
+                left = self.seconds - (time.perf_counter() - self.began)
+                # A few points there are in any case. The first timed run belongs to the point, more are made in time.
+                if turn == 0:
+                    skip = left < 0.0 and place >= FEWEST_POINTS
+                else:
+                    skip = i not in spent or (turn > 1 and spent[i] > left)
+                if skip:
+                    self.done += work[i] * (1.5 if turn == 0 else 1.0)
+                    continue
+                start = time.perf_counter()
+                result = self._traced(setting.options, self.seed, setting.scene, turn == 0, work[i] * (1.5 if turn == 0 else 1.0))
+                spent[i] = time.perf_counter() - start
+                if turn == 0:
+                    kinds = [f for f in result.figures.values() if isinstance(f, dict)]
+                    setting.rays = sum(f["rays"] for f in kinds)
+                    setting.tests = round(sum(f["N_IT"] * f["rays"] for f in kinds))
+                    setting.error = errors(result.image, reference)
+                else:
+                    setting.times.append(result.figures["T_R"])
+            self.say(f"{'counted' if turn == 0 else f'timed, {turn} of {REPEATS}'}: {time.perf_counter() - self.began:.0f} s")
+
+
+def _judged(settings, floor):
+    """Mark settings that are never worth it, and say in words what came out."""
+    words = []
+    for s in settings:
+        better = [o for o in settings if o.knob == s.knob and max(o.times) < min(s.times) and o.error["rmse"] < s.error["rmse"]]
+        if better:
+            best = min(better, key=lambda o: o.error["rmse"])
+            s.verdict = f"dominated by {best.curve}: {best.label}"
+    if not settings:
+        return ["Nothing was measured: there was no time."]
+    enough = [s for s in settings if s.error["rmse"] <= STEP]
+    best = min(settings, key=lambda s: s.error["rmse"])
+    if floor > STEP:
+        words.append(f"The reference's own error, {floor:.2g}, is above 1/255 = {STEP:.2g}: what reaches 1/255 cannot be told. "
+                     "Give more --seconds, or a smaller --size.")
+    elif enough:
+        s = min(enough, key=lambda s: min(s.times))
+        words.append(f"For an error of 1/255 the cheapest setting is {s.curve}: {s.label} (RMSE {s.error['rmse']:.2g}, "
+                     f"{min(s.times):.3g} s, {s.rays:,} rays).")
+    else:
+        words.append(f"No setting reached an error of 1/255 = {STEP:.2g}. Give more --seconds, or a smaller --size.")
+    words.append(f"The least error, {best.error['rmse']:.2g}, has {best.curve}: {best.label} ({min(best.times):.3g} s)"
+                 + (", which the reference's own error of " f"{floor:.2g} does not let one tell from less." if best.error["rmse"] < 2.0 * floor
+                    else f"; the reference's own error is {floor:.2g}."))
+    never = {}
+    for s in settings:
+        if s.verdict:
+            never.setdefault(s.curve, []).append(s.label)
+    if never:
+        words.append("Never worth it, because another setting of the same knob is both faster and more exact: "
+                     + "; ".join(f"{curve}: {', '.join(labels)}" for curve, labels in never.items()) + ".")
+    return words
+
+
+#: Plot -> (figure along x, its title, measure along y).
+PLOTS = {
+    "error_time.png": ("T", "T: run time, s (least of all runs; the line reaches to the slowest)", "rmse"),
+    "error_rays.png": ("rays", "rays", "rmse"),
+    "error_tests.png": ("tests", "intersection tests", "rmse"),
+    "flip_time.png": ("T", "T: run time, s", "flip"),
+}
+
+
+def plot(path, result, name, title):
+    """Draw one of `PLOTS`; returns whether there was anything to draw. Exact settings, error 0, stand at the foot."""
+    x, x_title, y = PLOTS[name]
+    rows = [r for r in result["rows"] if r[x] > 0]
+    if not rows:
+        return False
+    figure = report.figure_class()(figsize=(10, 6), layout="constrained")
+    axes = figure.add_subplot(xlabel=x_title, ylabel=MEASURES[y], title=title, xscale="log", yscale="log")
+    positive = [r[y] for r in rows if r[y] > 0]
+    foot = 0.5 * min(positive, default=1e-6)
+    for i, curve in enumerate(dict.fromkeys(r["curve"] for r in rows)):
+        points = sorted((r for r in rows if r["curve"] == curve), key=lambda r: r[x])
+        xs, ys = [r[x] for r in points], [r[y] or foot for r in points]
+        axes.plot(xs, ys, marker="osD^v<>pPX*h"[i % 12], color=f"C{i % 10}", linewidth=1, markersize=6, label=curve)
+        if x == "T":
+            axes.hlines(ys, xs, [r["T_worst"] for r in points], color=f"C{i % 10}", alpha=0.4)
+        for r, py in zip(points, ys):
+            if r[y] == 0:
+                axes.annotate("error 0", (r[x], py), fontsize=7, xytext=(4, 4), textcoords="offset points")
+    if y == "rmse":
+        if result["floor"] > 0:
+            axes.axhline(result["floor"], color="0.5", linestyle="--", label="the reference's own error")
+        axes.axhline(STEP, color="0.5", linestyle=":", label="1/255")
+    axes.grid(True, which="both", alpha=0.25)
+    axes.tick_params(axis="both", which="minor", labelsize=6)
+    axes.tick_params(axis="x", which="minor", rotation=60)
+    figure.legend(loc="outside right upper", frameon=False, fontsize=8)
+    figure.savefig(path, dpi=110)
+    return True
+
+
+def write(result, folder, title):
+    """Write error.csv, the plots and error.html, which holds them all.
+
+    Parameters
+    ----------
+    result : dict
+        From :func:`error_time`.
+    folder : path-like
+    title : str
+
+    Returns
+    -------
+    files : list of Path
+    note : str
+        How to get plots, where matplotlib is missing; else empty.
+    """
+    folder, note = report.folder(folder), ""
+    files = [folder / "error.csv"]
+    files[0].write_text(report.to_csv(result["rows"], COLUMNS), encoding="utf-8")
+    drawn = []
+    try:
+        drawn = [folder / name for name in PLOTS if plot(folder / name, result, name, title)]
+    except MissingPackageError as error:
+        note = str(error)
+    page = folder / "error.html"
+    page.write_text(_page(result, title, drawn, note), encoding="utf-8")
+    return [*files, *drawn, page], note
+
+
+def _page(result, title, pictures, note):
+    """One HTML page with everything in it."""
+    def cell(row, column):
+        value = row.get(column)
+        kind = "" if isinstance(value, str) else " class=n"
+        return f"<td{kind}>{html.escape(report.text(value, column))}</td>"
+
+    head = "".join(f"<th title='{html.escape(MEASURES.get(c, c))}'>{c}</th>" for c in COLUMNS)
+    body = "".join(f"<tr>{''.join(cell(r, c) for c in COLUMNS)}</tr>" for r in result["rows"])
+    images = "".join(f"<img alt='{p.stem}' src='data:image/png;base64,{base64.b64encode(p.read_bytes()).decode()}'>" for p in pictures)
+    lines = "".join(f"<p>{html.escape(line)}</p>" for line in [*result["words"], *([note] if note else [])])
+    left = "".join(f"<li>{html.escape(line)}</li>" for line in result["left_out"])
+    return f"""<!doctype html><html lang=en><meta charset=utf-8><meta name=viewport content="width=device-width">
+<title>{html.escape(title)}</title>
+<style>body{{font:16px/1.5 system-ui,sans-serif;max-width:1100px;margin:2em auto;padding:0 1em}}img{{max-width:100%}}
+table{{border-collapse:collapse;font-size:13px;display:block;overflow-x:auto}}td,th{{padding:.2em .6em;text-align:left;border-bottom:1px solid #ddd}}
+td.n{{text-align:right}}</style>
+<h1>Error against run time</h1><p>{html.escape(title)}</p>{lines}{images}
+<table><tr>{head}</tr>{body}</table><h2>Left out</h2><ul>{left}</ul></html>
+"""

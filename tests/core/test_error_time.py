@@ -1,0 +1,205 @@
+"""Error against run time: the measures, the convergence of the tracer, the sweep and what it says."""
+
+import csv
+import json
+import math
+
+import numpy as np
+import pytest
+
+from rayscope.core import Camera, Cancelled, Light, Material, Mesh, Object, Scene, SceneError, World, solids, trace
+from rayscope.core.command import main
+from rayscope.core.image_file import to_srgb
+from rayscope.core.lab import error_time as lab
+from rayscope.core.lab.picture_error import STEP, displayed, errors
+from rayscope.core.lab.tessellate import curved, tessellated
+
+
+def room(mirror=True, soft=True, ball=True):
+    """A floor with or without a mirror, a lamp with an extent, an analytic ball."""
+    objects = [Object("floor", Mesh(np.array([(-9, -9, 0), (9, -9, 0), (0, 15, 0)], float), [(0, 1, 2)]))]
+    if mirror:
+        wall = Mesh(np.array([(-2, 2, 0), (3, 2, 0), (0, 3, 4)], float), [(0, 1, 2)])
+        objects.append(Object("mirror", wall, materials=(Material("m", mirror=0.7),)))
+    return Scene(
+        objects,
+        [Light("lamp", "point", (50, 50, 50), (3, -3, 4), radius=0.4 * soft)],
+        Camera.look_at((0, -6, 3), (0, 0, 0.6), angle=math.radians(40), aspect=4 / 3),
+        World((0.2, 0.3, 0.5)),
+        solids=[solids.sphere((0, 0, 0.7), 0.7)] if ball else [],
+        name="room",
+    )
+
+
+def test_measures_by_hand():
+    reference = np.full((2, 2, 3), 0.25)
+    image = reference.copy()
+    image[0, 0, 1] = 0.5
+    off = to_srgb(0.5) - to_srgb(0.25)
+    got = errors(image, reference)
+    assert got["rmse"] == pytest.approx(math.sqrt(off**2 / 12))
+    assert got["maximum"] == pytest.approx(off)
+    assert got["share"] == 0.25
+    assert got["relative_mse"] == pytest.approx((0.25 / 0.26) ** 2 / 12)
+    assert 0 < got["flip"] < 1
+    assert set(got) == set(lab.MEASURES)
+    assert all(v < 1e-12 for v in errors(reference, reference).values())
+    # Less than a display's step is not off; brighter than white is white.
+    slight = errors(reference + 0.4 / 255, reference)
+    assert slight["share"] == 0.0 and slight["rmse"] > 0
+    assert errors(np.full((2, 2, 4), 5.0), np.ones((2, 2, 4)))["rmse"] == 0
+
+
+def test_uniform_sampling_converges_as_the_root_of_the_samples():
+    """RMSE against samples, on edges and soft shadows together: slope -1/2 within 15 %."""
+    scene, size = room(mirror=False), (24, 18)
+    counts = (4, 16, 64)
+    reference = sum(np.asarray(trace(scene, size=size, samples=512, seed=s).image, float) for s in (90, 91)) / 2
+    rmse = []
+    for n in counts:
+        squares = [np.mean((displayed(trace(scene, size=size, samples=n, seed=s).image) - displayed(reference)) ** 2) for s in range(4)]
+        rmse.append(math.sqrt(np.mean(squares)))
+    slope = np.polyfit(np.log(counts), np.log(rmse), 1)[0]
+    assert -0.575 < slope < -0.425
+
+
+def test_tessellations_come_closer_to_the_solids():
+    scene = Scene(
+        solids=[solids.sphere((0, 0, 0), 1.0), solids.cylinder((2, 0, -1), (2, 0.5, 1), 0.5), solids.cone((-2, 0, -1), (-2, 0, 1), 0.8, 0.3),
+                solids.cone((0, 0, 1.2), (0, 0, 2), 0.4), solids.box((-1, -3, -1), (1, -2.5, -0.5))],
+        lights=[Light("sun", "sun", (3, 3, 3), direction=(-0.4, 0.5, -0.77))],
+        camera=Camera.look_at((0.5, -8, 2.5), (0, 0, 0.2), angle=math.radians(40), aspect=4 / 3),
+    )
+    assert curved(scene) and not curved(room(ball=False))
+    exact = trace(scene, size=(48, 36), samples=4)
+    rmse = []
+    for n in (8, 16, 64):
+        meshes = tessellated(scene, n)
+        assert not curved(meshes) and len(meshes.objects) == 5
+        for o in meshes.objects[1:]:
+            # Closed, and wound outwards: the volume below the triangles is that of the solid, nearly.
+            a, b, c = (o.geometry.vertices[o.geometry.triangles[:, i]] for i in range(3))
+            volume = np.einsum("ij,ij->i", a, np.cross(b, c)).sum() / 6
+            whole = {"sphere": 4 * math.pi / 3, "cylinder": math.pi}.get(o.geometry.name)
+            assert volume > 0 and (whole is None or 0.6 * whole < volume < whole)
+        rmse.append(errors(trace(meshes, size=(48, 36), samples=4).image, exact.image)["rmse"])
+    assert rmse[0] > 2 * rmse[1] > 4 * rmse[2]
+
+
+@pytest.fixture(scope="module")
+def swept():
+    return lab.error_time(room(), (16, 12), seconds=12, seed=3)
+
+
+def test_every_knob_the_scene_has_something_for_is_swept(swept):
+    curves = {r["curve"].split(",")[0] for r in swept["rows"]}
+    assert curves == {"samples", "corners", "variance", "maximum depth", "adaptive depth", "adaptive depth with roulette",
+                      "shadow rays to each light", "tessellation"}
+    for row in swept["rows"]:
+        assert set(lab.COLUMNS) <= set(row)
+        assert 0 < row["T"] <= row["T_worst"] and len(row["times"]) == row["runs"] >= 1
+        assert row["rays"] > 16 * 12 and row["tests"] > 0
+        assert 0 < row["rmse"] <= row["maximum"] <= 1 and 0 <= row["share"] <= 1 and 0 < row["flip"] < 1
+    uniform = [r for r in swept["rows"] if r["curve"] == "samples"]
+    assert [r["rays"] for r in uniform] == sorted(r["rays"] for r in uniform)
+    assert uniform[-1]["rmse"] < uniform[0]["rmse"]
+    finest = max(r["options"]["samples"] for r in swept["rows"] if "samples" in r["options"])
+    assert swept["reference"]["samples"] >= 16 * finest
+    assert swept["reference"]["seeds"] == [4, 5]
+    assert 0 < swept["floor"] < uniform[-1]["rmse"]
+
+
+def test_what_it_says_follows_from_its_rows(swept):
+    rows, words = swept["rows"], " ".join(swept["words"])
+    enough = [r for r in rows if r["rmse"] <= STEP]
+    if swept["floor"] > STEP:
+        assert "cannot be told" in words
+    elif enough:
+        cheapest = min(enough, key=lambda r: r["T"])
+        assert f"cheapest setting is {cheapest['curve']}: {cheapest['setting']}" in words
+    else:
+        assert "No setting reached" in words
+    for row in rows:
+        better = [o for o in rows if o["T_worst"] < row["T"] and o["rmse"] < row["rmse"]]
+        assert not row["verdict"] or better
+
+
+def test_knobs_without_an_object_are_left_out_and_named():
+    result = lab.error_time(room(mirror=False, soft=False, ball=False), (8, 6), seconds=3)
+    assert {r["curve"].split(",")[0] for r in result["rows"]} <= {"samples", "corners", "variance"}
+    left = " ".join(result["left_out"])
+    for text in ("no mirrors and no glass", "no light of the scene has an extent", "no sphere, cylinder or cone"):
+        assert text in left
+
+
+def test_dominated_settings():
+    def setting(label, knob, seconds, rmse):
+        return lab.Setting("curve", label, knob, {}, times=seconds, error={"rmse": rmse})
+
+    good = setting("good", "a", [1.0, 1.2], 0.001)
+    slow = setting("slow", "a", [1.3, 2.0], 0.002)
+    noisy = setting("overlapping times", "a", [1.1, 1.4], 0.002)
+    fast = setting("cheap", "a", [0.5], 0.01)
+    other = setting("another knob", "b", [9.0], 0.1)
+    words = lab._judged([good, slow, noisy, fast, other], floor=1e-4)
+    assert slow.verdict == "dominated by curve: good"
+    assert not (good.verdict or noisy.verdict or fast.verdict or other.verdict)
+    assert "cheapest setting is curve: good" in words[0]
+    assert "slow" in words[-1] and "cheap" not in words[-1]
+    assert "cannot be told" in lab._judged([good], floor=0.1)[0]
+    assert "No setting reached" in lab._judged([fast], floor=1e-4)[0]
+
+
+def test_too_little_time_gives_fewer_points_and_none_that_are_wrong():
+    little = lab.error_time(room(), (16, 12), seconds=0.01)
+    assert little["rows"] and little["reference"]["samples"] >= 16 * 2
+    assert any("samples" in line for line in little["left_out"])
+    for row in little["rows"]:
+        assert row["T"] > 0 and row["rmse"] > 0
+
+
+def test_stopping():
+    def after(limit):
+        def progress(fraction):
+            if fraction > limit:
+                raise Cancelled("enough")
+        return progress
+
+    with pytest.raises(Cancelled):
+        lab.error_time(room(), (16, 12), seconds=5, progress=after(0.05))
+    kept = lab.error_time(room(), (16, 12), seconds=8, progress=after(0.6))
+    assert kept["stopped"] and kept["rows"] and all(r["times"] for r in kept["rows"])
+
+
+def test_an_empty_scene():
+    with pytest.raises(SceneError, match="nothing to trace"):
+        lab.error_time(Scene(camera=room().camera), seconds=1)
+
+
+def test_command(tmp_path, capsys):
+    nff = tmp_path / "scene.nff"
+    nff.write_text("v\nfrom 0 -6 3\nat 0 0 0.6\nup 0 0 1\nangle 40\nhither 0.1\nresolution 16 12\nb 0.2 0.3 0.5\nl 3 -3 4\n"
+                   "f 0.8 0.6 0.4 0.7 0.3 10 0 1\ns 0 0 0.7 0.7\n")
+    out = tmp_path / "out"
+    assert main(["error", str(nff), "--out", str(out), "--seconds", "2", "--size", "12x9", "--json"]) == 0
+    printed = json.loads(capsys.readouterr().out)
+    assert printed == json.loads((out / "error.json").read_text())
+    assert printed["verb"] == "error" and printed["rows"] and printed["parameters"] == {"size": [12, 9], "seconds": 2}
+    with open(out / "error.csv", newline="") as file:
+        table = list(csv.DictReader(file))
+    assert [float(r["rmse"]) for r in table] == [r["rmse"] for r in printed["rows"]]
+    page = (out / "error.html").read_text()
+    assert "http" not in page.replace("http-equiv", "") and printed["words"][0][:30] in page.replace("&#x27;", "'")
+    pytest.importorskip("matplotlib")
+    assert page.count("data:image/png;base64,") == len(lab.PLOTS)
+    for name in lab.PLOTS:
+        assert (out / name).read_bytes()[:4] == b"\x89PNG"
+
+
+def test_without_matplotlib_the_rest_is_written(tmp_path, monkeypatch, swept):
+    import sys
+
+    monkeypatch.setitem(sys.modules, "matplotlib.figure", None)
+    files, note = lab.write(swept, tmp_path, "room")
+    assert "matplotlib" in note and sorted(f.name for f in files) == ["error.csv", "error.html"]
+    assert "pip install matplotlib" in (tmp_path / "error.html").read_text()
