@@ -34,8 +34,8 @@ SLOW = 10.0
 #: Times below this are the machine's, not ours: seconds.
 NOISE = 0.02
 #: Rays per case; of those held against exact arithmetic; of those timed.
-RAYS = {False: {"pure": 36, "fast": 36}, True: {"pure": 120, "fast": 1200}}
-EXACT = {False: 16, True: 60}
+RAYS = {False: 36, True: 90}
+EXACT = {False: 16, True: 45}
 TIMED = {"pure": 24, "fast": 400}
 
 COLUMNS = ("case", "technique", "core", "rays", "wrong", "lost", "ghost", "leaks", "self_hits", "t_error", "slow", "work", "verdict")
@@ -368,10 +368,12 @@ def run(full=False, seed=0, names=None, only=None, seconds=None, timed=True, say
             left_out.append(f"{case.name}: there was no time.")
             continue
         say(f"{case.name} ({k + 1} of {len(everything)})")
-        scene, batch = scene_and_rays(case, seed, RAYS[full]["pure"])
+        scene, batch = scene_and_rays(case, seed, RAYS[full])
         right = asked(batch, built(case, scene, "brute", "pure"))
         truths.append(_truth_row(case, scene, batch, right, full))
         for name, core in contestants(names):
+            if core not in case.cores:
+                continue
             if not takes(name, case):
                 left_out.append(f"{case.name}: {name} takes only primitives of the kind {technique(name).primitives}.")
                 continue
@@ -438,7 +440,7 @@ def failure(row, seed, full):
     dict
     """
     case = next(c for c in cases(full) if c.name == row["case"])
-    scene, batch = scene_and_rays(case, seed, RAYS[full]["pure"])
+    scene, batch = scene_and_rays(case, seed, RAYS[full])
     rays = [{"number": r, "o": [x.hex() for x in batch.o[r].tolist()], "d": [x.hex() for x in batch.d[r].tolist()],
              "t_min": batch.t_min[r].item().hex(), "t_max": batch.t_max[r].item().hex()} for r in row["bad"][:20]]
     return {"case": case.name, "full": full, "seed": seed, "technique": row["technique"], "core": row["core"], "verdict": row["verdict"],
@@ -477,7 +479,7 @@ def replay(path, say=lambda line: None):
         rays = [[[float.fromhex(x) for x in ray[k]] for k in "od"] + [float.fromhex(ray[k]) for k in ("t_min", "t_max")] for ray in saved["rays"]]
     except (ValueError, KeyError, TypeError, StopIteration):
         raise SceneError(f"{path}: this is no failing case that `rayscope stability` has written; give one of the files in its folder failures.") from None
-    scene, batch = scene_and_rays(case, saved["seed"], RAYS[saved["full"]]["pure"])
+    scene, batch = scene_and_rays(case, saved["seed"], RAYS[saved["full"]])
     if checksum(scene) != saved["scene"]:
         raise SceneError(f"{path}: the case {case.name!r} has changed since this was written; run `rayscope stability` again.")
     say(f"{saved['technique']} ({saved['core']}) on {case.name}: was {saved['verdict']}")
@@ -492,7 +494,7 @@ def replay(path, say=lambda line: None):
                           "found": (float(got.t[k]), int(got.primitive[k])), "exact": float(true[0]) if true else None})
     right = asked(batch, brute)
     friendly = next(c for c in cases(saved["full"]) if c.name == "friendly")
-    scene_f, batch_f = scene_and_rays(friendly, saved["seed"], RAYS[saved["full"]]["pure"])
+    scene_f, batch_f = scene_and_rays(friendly, saved["seed"], RAYS[saved["full"]])
     base = examine(friendly, scene_f, batch_f, asked(batch_f, built(friendly, scene_f, "brute", "pure")), saved["technique"], saved["core"],
                    saved["seed"], None)
     row = examine(case, scene, batch, right, saved["technique"], saved["core"], saved["seed"], base)

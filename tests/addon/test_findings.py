@@ -57,3 +57,40 @@ def test_no_camera(scene):
     bpy.data.objects.remove(scene.camera)
     with pytest.raises(RuntimeError, match="no camera"):
         bpy.ops.rayscope.inspect()
+
+
+class Sheet:
+    """A layout that takes notes."""
+
+    def __init__(self, notes=None):
+        self.notes = [] if notes is None else notes
+
+    def label(self, text="", icon="NONE"):
+        self.notes.append(text)
+
+    def operator(self, name, text="", icon="NONE"):
+        self.notes.append(text)
+        self.last = type("Button", (), {})()
+        self.notes.append(self.last)
+        return self.last
+
+    def box(self, **_):
+        return Sheet(self.notes)
+
+    row = column = grid_flow = box
+
+
+def test_what_the_panels_show(scene):
+    copy_of(bpy.data.objects["Cube"], "Twin")
+    bpy.ops.rayscope.inspect()
+    sheet = Sheet()
+    result = inspection.found_in(scene)
+    findings.draw_costs(sheet, result)
+    findings.draw_finding(sheet, result.findings[0], 40)
+    findings.draw_finding(sheet, inspection.warnings_of(scene)[0], 40)
+    texts = [n for n in sheet.notes if isinstance(n, str)]
+    names = [n.names for n in sheet.notes if not isinstance(n, str) and hasattr(n, "names")]
+    assert texts[:3] == ["Object", "Tests", "Steps"] and "Cube" in names and texts.count("Select") == 2
+    assert any("Duplicate" in t for t in texts) and max(map(len, texts)) <= 60
+    for icon in findings.ICONS.values():
+        assert icon in bpy.types.UILayout.bl_rna.functions["label"].parameters["icon"].enum_items
