@@ -571,6 +571,31 @@ def error_verb(call):
     return Outcome("\n".join(text), record, FAILED if result["stopped"] else DONE)
 
 
+# --- kernels ----------------------------------------------------------------------------------------------------------
+
+def kernels_options(sub):
+    sub.add_argument("--rays", metavar="N", type=whole(1, 100_000), default=400, help="for each kind of wrong answer")
+    sub.add_argument("--repeats", type=whole(1, 1000), default=7, help="of the timings; the least counts")
+    sub.add_argument("--seed", type=whole(0, 2**31 - 1), default=0)
+    sub.add_argument("--out", metavar="DIR", help="write table, CSV and JSON there")
+
+
+def kernels_verb(call):
+    """Tests of a ray against a triangle or a box."""
+    from .lab import kernels
+
+    if call.out:
+        report.folder(call.out)
+    result = kernels.kernels(call.rays, call.repeats, call.seed, say=say)
+    record = report.record("kernels", None, call.seed, {"rays": call.rays, "repeats": call.repeats}, **result)
+    text = [kernels.text(result)]
+    if call.out:
+        path = Path(call.out) / "kernels.json"
+        path.write_text(report.to_json(record) + "\n", encoding="utf-8")
+        text += ["", *(f"written: {f}" for f in (*kernels.write(result, call.out), path))]
+    return Outcome("\n".join(text), record)
+
+
 @dataclass(frozen=True)
 class Verb:
     """One verb.
@@ -600,6 +625,8 @@ VERBS = {
     "motion": Verb("refit trees after motion, against new ones; what the order of insertion does", motion_verb, motion_options),
     "error": Verb("error against run time, for each setting that the scene has something for", error_verb, error_options),
     "bench": Verb("measure against mathutils' BVHTree and Embree", bench_verb, bench_options, scene=False),
+    "kernels": Verb("compare tests of a ray against a triangle or a box: time, operations, bytes, wrong answers", kernels_verb, kernels_options,
+                    scene=False),
     "stability": Verb("run techniques on stiff and extreme cases against exact arithmetic", stability_verb, stability_options, scene=False),
     "needs": Verb("say what the scene needs, what is left out and why", needs_verb, needs_options),
     "inspect": Verb("say what each object costs, and what could be done", inspect_verb, inspect_options),

@@ -45,7 +45,7 @@ def branchless(ray, lo, hi, t_far):
     """Least and greatest of all planes, one decision at the end (Barnes, "Fast, Branchless Ray/Bounding Box Intersections", 2011;
     Majercik et al. 2018).
 
-    NaN makes the greater of two planes the wrong one where the origin lies in the upper plane (the lower one, for -0).
+    In the upper plane of a box the second number is NaN and the first is taken for both: a box that is met is missed.
 
     Operations: 6 multiplications, 6 additions, 0 divisions, 13 comparisons.
 

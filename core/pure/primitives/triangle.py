@@ -68,6 +68,11 @@ class Triangle(Primitive):
         self.lo, self.hi = tuple(map(min, a, b, c)), tuple(map(max, a, b, c))
 
     def intersect(self, ray, t_far, watch=None):
+        """Woop, Benthin and Wald, "Watertight Ray/Triangle Intersection", 2013.
+
+        Operations: 25 multiplications, 27 additions, 3 divisions, 6 comparisons (of a hit in front; signs are free; 7, 5, 0, 1 of them
+        decide whether rounding matters, see :mod:`~rayscope.core.scene.exact`).
+        """
         kx, ky, kz = ray.axes
         ox, oy, oz = ray.o[kx], ray.o[ky], ray.o[kz]
         sx, sy, sz = ray.shear
