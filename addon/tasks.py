@@ -19,7 +19,8 @@ def choice_of(scene):
 def options_of(scene):
     """A Blender scene's other settings, as keywords of :class:`~rayscope.core.rendering.Rendering`."""
     settings = scene.rayscope
-    return {"depth": settings.depth, "samples": settings.samples, "seed": settings.seed, "count": settings.count}
+    fewer = {name: getattr(settings.fewer_rays, name) for name in settings.fewer_rays.__annotations__}
+    return {"depth": settings.depth, "samples": settings.samples, "seed": settings.seed, "count": settings.count, **fewer}
 
 
 def picture_size(scene):

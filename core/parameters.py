@@ -58,7 +58,7 @@ class Parameter:
     @property
     def label(self):
         """The name as Blender's interface shows it."""
-        return self.name.replace("_", " ").title()
+        return self.name.replace("_", " ").title().replace("Aa ", "AA ")
 
     def choices_in(self, core):
         """The choices that one core offers."""

@@ -78,7 +78,7 @@ class Painter:
             part = tuple(max(1, side // coarseness) for side in size)
             first = coarseness == COARSENESS[0]
             rendering = Rendering(scene, core=self.choice["core"], size=part, index=self._index, progress=progress if first else unless_moved,
-                                  **(options if coarseness == 1 else {**options, "samples": 1}))
+                                  **(options if coarseness == 1 else {**options, "samples": 1, "antialiasing": "uniform"}))
             for _ in rendering.tiles():
                 if not first:
                     self.fine, self.changed = rendering.result.image, True

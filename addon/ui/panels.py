@@ -157,6 +157,15 @@ class Tracing:
         column.prop(settings, "samples")
         column.prop(settings, "depth")
         column.prop(settings, "seed")
+        fewer = settings.fewer_rays
+        column.prop(fewer, "antialiasing")
+        if fewer.antialiasing != "uniform":
+            column.prop(fewer, "aa_threshold")
+            column.prop(fewer, "aa_level")
+        column.prop(fewer, "light_samples")
+        column.prop(fewer, "threshold")
+        if fewer.threshold:
+            column.prop(fewer, "roulette")
         column.prop(settings, "count")
 
 

@@ -8,7 +8,7 @@ from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, Po
 
 from . import redraw
 from .. import session
-from ...core import catalogue
+from ...core import catalogue, options
 from ...core.figures import FIGURES
 
 CORES = (("fast", "Fast", "Batches of rays with numpy"), ("pure", "Pure", "One ray at a time in plain Python: slow, made to be read"))
@@ -61,6 +61,9 @@ def _key(technique, core):
 #: One group for each technique and core, since their parameters' defaults and choices may differ.
 PARAMETERS = {_key(row.name, core): _group(f"RAYSCOPE_PG_{_key(row.name, core)}", {p.name: _property(p, core) for p in row.parameters})
               for row in catalogue.techniques() for core in row.cores}
+#: Ways to trace fewer rays: options of a picture that are not in the settings themselves.
+FEWER_RAYS = [p for p in options.PARAMETERS if p.name not in ("depth", "samples", "seed")]
+RAYSCOPE_PG_fewer_rays = _group("RAYSCOPE_PG_fewer_rays", {p.name: _property(p, "fast") for p in FEWER_RAYS})
 RAYSCOPE_PG_parameters = _group("RAYSCOPE_PG_parameters", {key: PointerProperty(type=group) for key, group in PARAMETERS.items()})
 
 
@@ -126,6 +129,7 @@ class RAYSCOPE_PG_settings(bpy.types.PropertyGroup):
                        soft_max=16)
     samples: IntProperty(name="Samples", description="Rays from the camera for each pixel", default=1, min=1, max=4096, soft_max=64)
     seed: IntProperty(name="Seed", description="Start of the random numbers that place the samples; the same seed gives the same picture", min=0)
+    fewer_rays: PointerProperty(type=RAYSCOPE_PG_fewer_rays)
     count: BoolProperty(name="Count", description="Count intersection tests and traversal steps, for the figures and the render passes N_IT, N_TS and "
                         "Rays per Pixel; it takes some time", default=False)
     csg: BoolProperty(name="CSG from Booleans", description="Trace objects with Boolean modifiers as CSG trees of their operands, closed meshes and "
@@ -151,7 +155,7 @@ class RAYSCOPE_PG_settings(bpy.types.PropertyGroup):
         return {p.name: getattr(group, p.name) for p in self.row().parameters}
 
 
-CLASSES = (*PARAMETERS.values(), RAYSCOPE_PG_parameters, RAYSCOPE_PG_overlay, RAYSCOPE_PG_figures, RAYSCOPE_PG_settings)
+CLASSES = (*PARAMETERS.values(), RAYSCOPE_PG_parameters, RAYSCOPE_PG_fewer_rays, RAYSCOPE_PG_overlay, RAYSCOPE_PG_figures, RAYSCOPE_PG_settings)
 
 
 def register():

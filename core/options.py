@@ -1,0 +1,35 @@
+"""What can be set of a picture besides its techniques; numpy is not needed to know it."""
+
+from .parameters import Parameter
+
+#: What can be set besides the techniques; panels and the command take their ranges from here.
+PARAMETERS = (
+    Parameter(
+        "depth", 5, "Reflections and refractions in a row, at most (H); 0 means local light alone", low=0, high=10_000
+    ),
+    Parameter(
+        "samples", 1, "Samples a pixel; 1 goes through the pixel's centre and gives hard shadows", low=1, high=1_000_000
+    ),
+    Parameter("seed", 0, "Chooses other random numbers", low=-(2**31), high=2**31 - 1),
+    Parameter(
+        "threshold", 0.0, "Rays with less weight in their pixel are not traced (adaptive depth)", low=0.0, high=1.0
+    ),
+    Parameter("roulette", False, "Trace some of the rays below the threshold, by chance, for the others"),
+    Parameter(
+        "antialiasing",
+        "uniform",
+        "Samples: equally many in all pixels; at the corners of pixels, divided where these differ (Whitted); "
+        "more where their variance is high",
+        choices=("uniform", "corners", "variance"),
+    ),
+    Parameter(
+        "aa_threshold",
+        0.03,
+        "Adaptive antialiasing: differences in displayed values, 0 to 1, that are put up with: between corners; "
+        "as standard error of a pixel",
+        low=0.0,
+        high=1.0,
+    ),
+    Parameter("light_samples", 1, "Shadow rays to each light that has an extent, per surface met", low=1, high=4096),
+    Parameter("aa_level", 2, "Adaptive antialiasing: 4^level samples a pixel, at most", low=1, high=8),
+)
