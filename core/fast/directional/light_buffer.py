@@ -47,9 +47,11 @@ class LightBuffer(Handing):
         return light.kind in ("point", "spot", "sun") and bool(np.isfinite(where).all()) and (light.kind != "sun" or any(where))
 
     def for_light(self, light):
-        """The structure for shadow rays to one light."""
-        number = next((k for k, own in enumerate(self.lights if self.primitives.n else ()) if own is light), None)
-        return self if number is None else OneLight(self, number)
+        """The structure for shadow rays to one light; the second where there can be no buffer."""
+        if not self.primitives.n:
+            return self
+        number = next((k for k, own in enumerate(self.lights) if own is light), None)
+        return self.second if number is None else OneLight(self, number)
 
     def traverse(self, rays, query):
         left = np.arange(rays.n)
@@ -74,15 +76,22 @@ class LightBuffer(Handing):
         if not len(which):
             return which
         buffer = self.buffer(number)
+        parts = buffer.parts
         own = buffer.test(rays, query, which)
+        if buffer.parts != parts:
+            self._make_room(number)
+        return which if not own.any() else which[~own]
+
+    def _make_room(self, number):
+        """Give up the buffers not used for longest when all take too much memory."""
         while len(self.buffers) > 1 and sum(b.nbytes for b in self.buffers.values()) > self.max_bytes:
             self.buffers.pop(next(iter(self.buffers)))
         used = sum(b.nbytes for b in self.buffers.values())
-        self.figures.update(N_ER=sum(b.references for b in self.buffers.values()))
+        second = self._second.figures["memory"] if self._second is not None else 0
+        self.figures.update(N_ER=sum(b.references for b in self.buffers.values()), memory=used + second)
         if used > self.max_bytes and not any(n.name == self.lights[number].name for n in self.notices):
             self.notices.append(Notice(self.lights[number].name, f"its buffer takes {used} bytes, more than max_bytes = {self.max_bytes:g}, though "
                                        "its resolution was lowered. Raise max_bytes, or name another technique for shadow rays."))
-        return which[~own]
 
 
 class OneLight(Structure):
@@ -109,6 +118,10 @@ class _Point:
     @property
     def nbytes(self):
         return self.cube.nbytes
+
+    @property
+    def parts(self):
+        return len(self.cube.faces)
 
     @property
     def references(self):
@@ -161,6 +174,10 @@ class _Sun:
     @property
     def nbytes(self):
         return self.lists.nbytes if self.lists else 0
+
+    @property
+    def parts(self):
+        return int(self.lists is not None)
 
     @property
     def references(self):

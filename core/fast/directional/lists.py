@@ -11,7 +11,7 @@ from .raster import Grid, spans
 from .view import Footprints
 
 #: Cells a footprint, where no resolution is asked for.
-CELLS_PER_PRIMITIVE = 2.0
+CELLS_PER_PRIMITIVE = 1.0
 #: Cells along a side, at most.
 MOST_ALONG = 2048
 #: Entries that rays look at in their first round; each round doubles them.
@@ -35,12 +35,13 @@ class Lists:
         Where each cell's entries begin.
     entry : ndarray, int32
         Numbers of footprints, ascending in each cell.
+    nbytes : int
     """
 
     def __init__(self, view, primitives, resolution=0, most_bytes=np.inf, which=None):
         self.view = view
         self.feet = feet = Footprints.of(view, primitives, which=which)
-        self.grid, self.entry = None, np.zeros(0, np.int32)
+        self.grid, self.entry, self.nbytes = None, np.zeros(0, np.int32), 0
         if not len(feet):
             return
         u_lo, v_lo = max(-1.0, float(feet.u_lo.min())), max(-1.0, float(feet.v_lo.min()))
@@ -72,11 +73,8 @@ class Lists:
         self.entry = (keys & np.uint64(0xFFFFFFFF)).astype(np.int32)
         count = np.bincount((keys >> np.uint64(32)).astype(np.int64), minlength=cells)
         self.start = np.concatenate([[0], np.cumsum(count)])
+        self.nbytes = self.feet.nbytes + self.entry.nbytes + self.start.nbytes
         return True
-
-    @property
-    def nbytes(self):
-        return self.feet.nbytes + self.entry.nbytes + (self.start.nbytes if self.grid is not None else 0)
 
     def test(self, query, ray, u, v, nearness):
         """Test rays against what is listed where they pass the window.

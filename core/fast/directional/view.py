@@ -20,7 +20,7 @@ SINGLE = 2.0**-20
 #: Edges steeper than this against v do not bound u.
 STEEP = 2.0**20
 #: Primitives looked at together.
-CHUNK = 32_768
+CHUNK = 8_192
 
 
 class View:

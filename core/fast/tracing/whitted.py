@@ -321,6 +321,8 @@ class Whitted:
             probe = self.probe["shadow"]
             if structure is not probe.structure:
                 probe = Probe(structure, self.check, self.count)
+                # As far as the others have come: what one light's rays take says what another's will.
+                probe.piece = max((p.piece for p in self.to_light.values()), default=16_384)
             self.to_light[id(light)] = probe
         return probe
 

@@ -39,9 +39,11 @@ class LightBuffer(Handing):
             self.notices.append(self.needs("a point, spot or sun light", "Add one, or name another technique for shadow rays."))
 
     def for_light(self, light):
-        """The structure for shadow rays to one light."""
-        number = next((k for k, own in enumerate(self.lights if self.primitives else ()) if own is light), None)
-        return self if number is None else OneLight(self, number)
+        """The structure for shadow rays to one light; the second where there can be no buffer."""
+        if not self.primitives:
+            return self
+        number = next((k for k, own in enumerate(self.lights) if own is light), None)
+        return self.second if number is None else OneLight(self, number)
 
     def walk(self, query):
         if not any(self.serve(number, query) for number in range(min(len(self.lights), LIGHTS_TRIED))):
