@@ -241,11 +241,14 @@ def test_separated_lists_lose_nothing_and_test_more(axes):
     if axes == 3:
         cells = np.arange(len(exact.lists.count))
         items, length = index.candidates(cells)
-        first = np.cumsum(length) - length
+        first, listed, exactly = np.cumsum(length) - length, 0, 0
         for cell in cells:
             _, begin, count = exact.lists.of(np.array([cell]))
             mine = set(items[first[cell]:first[cell] + length[cell]].tolist())
+            listed, exactly = listed + length[cell], exactly + count[0]
             assert mine >= set(exact.lists.items[begin[0]:begin[0] + count[0]].tolist())
+        assert index.figures["surplus"] == pytest.approx(listed / exactly - 1.0)
+        assert build(scene, "separated-grid", core="pure", resolution=8).figures["surplus"] == pytest.approx(index.figures["surplus"])
     assert counts(index, o, d)[0][0].sum() > counts(exact, o, d)[0][0].sum()
 
 

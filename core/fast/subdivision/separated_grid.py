@@ -10,11 +10,13 @@ from ...cells import too_many_slabs
 from ...errors import MemoryEstimateError
 from ...hits import Cells
 from ...memory import free_memory
-from .grid import Grid
+from .grid import PAIRS, Grid
 from .lists import Visits, chunks, ranges
 
 #: Machine words of 64 bits looked at together.
 WORDS = 1 << 20
+#: Pairs of a primitive and a cell from which the surplus is estimated.
+SAMPLE = 1_000_000
 
 
 class SeparatedGrid(Grid):
@@ -46,8 +48,18 @@ class SeparatedGrid(Grid):
             self.slabs.append(make(ranges(first[:, axis], extent[:, axis]), item, int(self.resolution[axis]), p.n))
             progress(len(self.slabs) / len(self.axes))
         count = self._slab_counts()
-        self.figures.update(N_G=0, N_E=len(count), N_EE=int((count == 0).sum()), N_ER=references, depth=1,
+        self.figures.update(surplus=self._surplus(first, extent), N_G=0, N_E=len(count), N_EE=int((count == 0).sum()), N_ER=references, depth=1,
                             memory=sum(s.nbytes for s in self.slabs))
+
+    def _surplus(self, first, extent):
+        """References that intersecting lists adds to those of exact lists, as a part of these; from a sample of primitives."""
+        count = extent.prod(axis=1)
+        some = np.arange(0, self.primitives.n, 1 + int(count.sum()) // SAMPLE)
+        exact = 0
+        for part in chunks(count[some], PAIRS):
+            pieces = range(0, int(count[some[part]].sum()), PAIRS) if len(some[part]) == 1 else (0,)
+            exact += sum(len(self._reached(some[part], first, extent, count, piece, False)[0]) for piece in pieces)
+        return float(count[some].sum()) / max(exact, 1) - 1.0
 
     def _slab_counts(self):
         return np.concatenate([s.count for s in self.slabs])
