@@ -1,7 +1,9 @@
 """Exact decisions, for the few cases in which rounding errors are as large as the numbers; the same for both cores."""
 
-#: Edge functions whose sum is smaller than this part of the products that they consist of are calculated exactly.
-DOUBTFUL = 2.0**-40
+#: Edge functions whose sum is smaller than this part of the products that they consist of are calculated exactly: above,
+#: rounding moves a hit along the ray by 2^-53 / DOUBTFUL of the triangle's extent at most, and that only where it is seen
+#: edge-on, so that the hit is as little off its plane.
+DOUBTFUL = 2.0**-16
 
 
 def watertight(a, b, c, *corners):
@@ -20,15 +22,17 @@ def watertight(a, b, c, *corners):
         Each divided by their sum, rounded once; or None when the ray passes outside, sees the triangle edge-on, or
         the triangle has no area.
     """
+    if a[0] == b[0] == c[0] or a[1] == b[1] == c[1]:                    # edge-on along an axis: no need to calculate
+        return None
     ax, ay, bx, by, cx, cy = _whole(*a, *b, *c)
     u, v, w = cx * by - cy * bx, ax * cy - ay * cx, bx * ay - by * ax
     det = u + v + w
-    if det == 0 or min(u, v, w) < 0 < max(u, v, w) or _collinear(*corners):
+    if det == 0 or min(u, v, w) < 0 < max(u, v, w) or collinear(*corners):
         return None
     return u / det, v / det, w / det
 
 
-def _collinear(a, b, c):
+def collinear(a, b, c):
     """Whether three points lie on one line."""
     n = _whole(*a, *b, *c)
     e, f = [n[3 + k] - n[k] for k in range(3)], [n[6 + k] - n[k] for k in range(3)]
