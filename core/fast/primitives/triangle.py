@@ -7,7 +7,7 @@ so a ray cannot slip between them.
 
 import numpy as np
 
-from ...scene.exact import DOUBTFUL, watertight
+from ...scene.exact import DOUBTFUL, collinear, watertight
 from ...scene.layout import mirrors, to_world
 
 #: gamma(7): relative error of a point interpolated from three vertices (Pharr et al., PBR 4th ed., 6.8.5).
@@ -38,6 +38,7 @@ class Triangles:
         self.n = xyz.shape[1]
         self._flat = xyz.ravel()
         self.flips = bool(flip.any())
+        self._area = np.zeros(self.n, np.int8)                          # -1: none; 1: some; 0: not known yet
 
     @classmethod
     def of(cls, objects, which):
@@ -123,7 +124,13 @@ class Triangles:
         if len(doubtful):
             p, q = ([column.take(doubtful) for column in axis] for axis in (x, y))
             products = sum(np.abs(p[i] * q[j]) for i, j in ((2, 1), (1, 2), (0, 2), (2, 0), (1, 0), (0, 1)))
-            doubtful = doubtful[np.abs(det.take(doubtful)) <= DOUBTFUL * products]
+            some = np.flatnonzero(np.abs(det.take(doubtful)) <= DOUBTFUL * products)
+            doubtful, p, q = doubtful.take(some), *([column.take(some) for column in axis] for axis in (p, q))
+            # No area to be hit, exactly: nothing needs to be calculated one by one.
+            flat = (p[0] == p[1]) & (p[1] == p[2]) | (q[0] == q[1]) & (q[1] == q[2]) | self._collinear(item.take(pair.take(doubtful)))
+            for column in (u, v, w, det):
+                column[doubtful[flat]] = 0.0
+            doubtful = doubtful[~flat]
         for i in doubtful:
             corners = self.xyz[:, item[pair[i]]].reshape(3, 3).tolist()
             exact = watertight(*((float(x[k][i]), float(y[k][i])) for k in range(3)), *corners)
@@ -138,6 +145,12 @@ class Triangles:
         v /= det
         w /= det
         return pair, t, v, w, np.zeros(len(pair), np.int64)
+
+    def _collinear(self, item):
+        """Whether triangles have no area; found out exactly, once for each."""
+        for k in np.unique(item[self._area.take(item) == 0]):
+            self._area[k] = -1 if collinear(*self.xyz[:, k].reshape(3, 3).tolist()) else 1
+        return self._area.take(item) < 0
 
     def surface(self, rays, item, t, u, v, detail):
         """Object, primitive, part, normal, point and error of hits."""
