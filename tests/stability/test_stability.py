@@ -34,11 +34,6 @@ def test_brute_force_finds_what_is_exactly_there(case, known):
     picked = type(hits)(**{f: np.asarray(getattr(hits, f))[some] for f in ("t", "primitive", "object", "u", "v", "part", "normal", "point", "error")})
     row = stability.truth(case, scene, batch.take(some), picked)
     assert row["rays"] == len(some)
-    if case.name == "slivers 1e12":
-        # Edge functions of a sliver seen edge-on cancel to 2^-13 of themselves before exact arithmetic takes over
-        # (scene/exact.py, DOUBTFUL): t is off by as much of the sliver's length along the ray.
-        assert row["lost"] == row["wrong"] == 0 and row["off_surface"] < 2.0**13 / stability.EPSILON
-        return
     assert not row["bad"], row
     assert row["off_surface"] <= 16.0
     if not case.sweep or case.sweep[0] != "aspect":                      # nearly parallel to the plane, t is as badly conditioned as it is exact
