@@ -389,10 +389,15 @@ def bench_options(sub):
     sub.add_argument("--repeats", type=whole(1, 100), default=5)
     sub.add_argument("--seed", type=whole(0, 2**31 - 1), default=0)
     sub.add_argument("--growth", action="store_true", help="also how times grow from 1k to 1M triangles")
+    sub.add_argument("--automatic", action="store_true", help="instead: the automatic choice of techniques against each fixed one, on the procedural databases")
 
 
 def bench_verb(call):
     """Times against mathutils and Embree."""
+    if call.automatic:
+        from .lab import needs
+        rows = needs.benchmark(tuple(min(side, 256) for side in call.size), repeats=min(call.repeats, 3), say=say)
+        return Outcome(report.table(rows, list(rows[0])), report.record("bench", None, None, {"automatic": True, "size": call.size}, rows=rows))
     from .lab import bench
 
     result = bench.bench(call.subdivisions, call.size, call.repeats, call.seed, say=say)
