@@ -40,6 +40,10 @@ BUDGET = 0.65
 #: Another technique must be faster than the standard one by this part, as the model is not exact.
 MARGIN = 0.25
 STANDARD = "bvh"
+#: Techniques estimated to take this many times as long as it are not traced to compare.
+HOPELESS = 8.0
+#: Databases of :func:`benchmark`, with size factors that give some thousand primitives.
+DATABASES = {"balls": 3, "gears": 2, "jacks": 3, "lattice": 6, "mount": 5, "rings": 4, "teapot": 8, "tetra": 5, "tree": 9}
 #: Calibrated first: brute force tells what a test costs, which is the same for all.
 FIRST = ("brute", STANDARD, "kd-tree", "grid", "octree")
 #: Bytes of a triangle in a structure, about: what copies of instances would take.
@@ -526,9 +530,11 @@ def against_fixed(scene, size=(160, 120), core="fast", names=None, repeats=2):
         each, minus 1.
     """
     from ..rendering import trace
-    choice = resolve_automatic(scene, size, 1, 5, core, KINDS)
-    names = names or list(calibration(core)[0])
-    seconds = dict.fromkeys((AUTOMATIC, *names), math.inf)
+    if names is None:                                                   # those that could be the best
+        rows = plan(scene, size, core=core).rows
+        standard = next(row["s"] for row in rows if row["technique"] == STANDARD)
+        names = [row["technique"] for row in rows if row["s"] < HOPELESS * standard]
+    choice, seconds = {}, dict.fromkeys((AUTOMATIC, *names), math.inf)
     for _ in range(repeats):                                            # interleaved: a busy moment hits all alike
         for name in seconds:
             result = trace(scene, name, core, size)
@@ -538,3 +544,19 @@ def against_fixed(scene, size=(160, 120), core="fast", names=None, repeats=2):
     return {"scene": scene.name, "choice": " ".join(f"{k}={v}" for k, v in choice.items()), AUTOMATIC: seconds[AUTOMATIC], "best": seconds[best],
             "best_technique": best, STANDARD: seconds[STANDARD], "over_best": seconds[AUTOMATIC] / seconds[best] - 1.0,
             "over_bvh": seconds[AUTOMATIC] / seconds[STANDARD] - 1.0}
+
+
+def benchmark(size=(160, 120), core="fast", repeats=2, say=lambda line: None):
+    """The automatic choice against the best fixed one and STANDARD, on the standard procedural databases.
+
+    Returns
+    -------
+    list of dict
+        Rows of :func:`against_fixed`.
+    """
+    from ..scene.spd import spd
+    rows = []
+    for name, factor in DATABASES.items():
+        say(name)
+        rows.append(against_fixed(spd(name, factor), size, core, repeats=repeats))
+    return rows
