@@ -12,8 +12,8 @@ import numpy as np
 
 from ..catalogue import build
 from ..fast.rays import Rays
+from ..hits import box_area
 from ..scene.scene import Mesh, Object, Scene, Shapes
-from .hull import area_of
 from .rays import extent, primary_rays
 
 #: What is compared: technique, parameters.
@@ -24,10 +24,10 @@ TREES = (
 #: Pairs of rays and volumes timed at a time.
 PAIRS = 16_384
 
-COLUMNS = ("tree", "test", "build", "refit", "rebuild/refit", "tightness", "c_SAH", "refitted", "rebuilt", "N_IT", "N_IT refitted", "N_IT rebuilt")
+COLUMNS = ("tree", "test", "build", "refit", "rebuild/refit", "area/box", "c_SAH", "refitted", "rebuilt", "N_IT", "N_IT refitted", "N_IT rebuilt")
 MEANINGS = {
     "test": "one test of a volume, ns (- for the packed tree, whose boxes are tested four at a time)", "build": "T_B, s", "refit": "the least of all frames, s",
-    "rebuild/refit": "how many refits a new tree costs", "tightness": "area of the root's volume over that of the convex hull of all, where one object is all there is; of the box else",
+    "rebuild/refit": "how many refits a new tree costs", "area/box": "tightness: areas of all volumes over those of the axis-aligned boxes around the same",
     "c_SAH": "at the start", "refitted": "c_SAH after all frames, refitted each time", "rebuilt": "c_SAH of a new tree there",
     "N_IT": "tests of primitives a ray; at the start, and after all frames"}
 
@@ -108,7 +108,6 @@ def motion(scene, frames=10, n_rays=2000, seed=0, trees=TREES, say=lambda line: 
     """
     rays = primary_rays(scene, n_rays, np.random.default_rng(seed))
     later = [moved(scene, frame, seed) for frame in range(1, frames + 1)]
-    hull = area_of(scene.objects[0])[0] if len(scene.objects) == 1 else None
     rows = []
     for name, parameters in trees:
         label = ":".join([name, *(f"{k}={v}" for k, v in parameters.items())])
@@ -117,8 +116,8 @@ def motion(scene, frames=10, n_rays=2000, seed=0, trees=TREES, say=lambda line: 
         row = {"tree": label, "build": index.figures["T_B"], "c_SAH": index.figures["c_SAH"], "N_IT": _tests(index, rays)}
         if getattr(index, "wide", None) is None:
             row["test"] = _test_cost(index.volumes, rays)
-            lo, hi = scene.bounds()
-            row["tightness"] = float(index.volumes.area()[0]) / (hull or 2.0 * float(np.dot(hi - lo, np.roll(hi - lo, 1))) or 1.0)
+            boxes = index.cells()
+            row["area/box"] = float(index.area.sum() / (box_area(boxes.lo, boxes.hi).sum() or 1.0))
         row["refit"], row["course"] = math.inf, []
         for frame in later:
             start = time.perf_counter()

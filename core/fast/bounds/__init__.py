@@ -170,6 +170,13 @@ def margins(primitives):
         In space: `slack` whatever the ray, and min(stretch x the rounding error of positions on the ray, reach). The
         latter two are 0 but for slivers.
     """
+    if not hasattr(primitives, "margins"):              # found once: volumes are fitted in many pieces
+        primitives.margins = _margins(primitives)
+    return primitives.margins
+
+
+def _margins(primitives):
+    """The same, calculated."""
     slack = 16.0 * EPSILON * np.maximum(np.abs(primitives.lo), np.abs(primitives.hi)).max(axis=1)
     stretch, reach = np.zeros(primitives.n), np.zeros(primitives.n)
     for k, own in enumerate(primitives.kinds):

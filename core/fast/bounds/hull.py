@@ -22,6 +22,13 @@ def balls(primitives):
     start : ndarray, shape (n + 1,)
         The balls of primitive i are start[i] to start[i + 1].
     """
+    if not hasattr(primitives, "balls"):                # found once: volumes are fitted in many pieces
+        primitives.balls = _balls(primitives)
+    return primitives.balls
+
+
+def _balls(primitives):
+    """The same, calculated."""
     parts = [_of_kind(own, primitives.lo[a:b], primitives.hi[a:b]) for own, a, b in zip(primitives.kinds, primitives.starts, primitives.starts[1:])]
     centre, radius, count = (np.concatenate(c, axis=-1) for c in zip(*parts))
     return centre, radius, np.concatenate([[0], np.cumsum(count)])

@@ -1,5 +1,6 @@
 """k-DOPs: intersections of k / 2 slabs in fixed directions (Klosowski et al. 1998)."""
 
+import functools
 import itertools
 
 import numpy as np
@@ -10,6 +11,8 @@ from .aabb import box_area
 
 #: Corners and edges that coincide but for this, relative to the size, are one (areas only).
 COINCIDE = 1e-12
+#: Volumes whose areas are calculated together: what is needed of them should stay in the caches.
+AREAS = 512
 
 
 class KDops(Volumes):
@@ -20,14 +23,14 @@ class KDops(Volumes):
 
     @classmethod
     def fit(cls, primitives, item, offset, k):
-        used = np.unique(item)
+        used, inverse = np.unique(item, return_inverse=True)
         slack = margins(primitives)[0][used]
-        ends = np.empty((k, primitives.n))
+        ends = np.empty((k, len(used)))
         for row, axis in enumerate(AXES[k]):
             a = np.array(axis, float)
             low, high = primitives.support(used, np.broadcast_to(a, (len(used), 3)))
-            ends[row, used], ends[row + k // 2, used] = low - slack * np.abs(a).sum(), high + slack * np.abs(a).sum()
-        return cls(columns(primitives, item, np.arange(len(item)), ends[:, item])).joined(offset)
+            ends[row], ends[row + k // 2] = low - slack * np.abs(a).sum(), high + slack * np.abs(a).sum()
+        return cls(columns(primitives, item, np.arange(len(item)), ends[:, inverse])).joined(offset)
 
     def refitted(self, primitives, item, offset):
         return self.fit(primitives, item, offset, len(self.own))
@@ -58,7 +61,7 @@ class KDops(Volumes):
         return t_in, t_out
 
     def area(self):
-        return _area(self.own)
+        return np.concatenate([_area(self.own[:, i:i + AREAS]) for i in range(0, len(self), AREAS)])
 
     def boxes(self):
         half = len(self.own) // 2
@@ -75,36 +78,53 @@ def _area(columns):
     half = len(columns) // 2
     if half == 3:
         return box_area(columns[3:] - columns[:3])
-    normals = np.array([[-x for x in a] for a in AXES[2 * half]] + AXES[2 * half], float)
+    normals, lines = _lines(2 * half)
     # Measured from the middle, or everything cancels far from the origin.
     middle = 0.5 * (columns[:3] + columns[half:half + 3])
-    d = np.concatenate([-columns[:half], columns[half:]]) - normals @ middle
+    d = np.concatenate([-columns[:half], columns[half:]])
+    for axis in range(3):
+        d -= normals[:, axis, None] * middle[axis]
     tiny = COINCIDE * np.abs(d).max(axis=0)
     area = np.zeros(columns.shape[1])
-    for f, g in itertools.combinations(range(2 * half), 2):
-        e = np.cross(normals[f], normals[g])
-        ee = e @ e
-        if ee == 0.0:
-            continue
-        ff, gg, fg = normals[f] @ normals[f], normals[g] @ normals[g], normals[f] @ normals[g]
+    for f, g, ff, gg, fg, ee, cuts in lines:
         # The line's point nearest to the middle: p normals[f] + q normals[g].
         p, q = (d[f] * gg - d[g] * fg) / ee, (d[g] * ff - d[f] * fg) / ee
-        begin, end = np.full(len(area), -np.inf), np.full(len(area), np.inf)
-        for h in range(2 * half):
-            if h in (f, g):
-                continue
-            hf, hg = normals[h] @ normals[f], normals[h] @ normals[g]
-            room = d[h] - p * hf - q * hg
-            speed = normals[h] @ e
-            if speed > 0.0:
-                np.minimum(end, room / speed, out=end)
-            elif speed < 0.0:
-                np.maximum(begin, room / speed, out=begin)
-            else:
-                # Of several planes through one line, neighbours count: no other's normal is between theirs.
-                between_them = hf * gg > hg * fg and hg * ff > hf * fg
-                end[room < (tiny if between_them else -tiny)] = -np.inf
-        length = np.maximum(end - begin, 0.0) * np.sqrt(ee)
-        length[~np.isfinite(length)] = 0.0
+
+        def room(some):
+            h, hf, hg, by = some
+            out = d[h]
+            out -= hf * p
+            out -= hg * q
+            return out / by
+
+        length = room(cuts["ends"]).min(axis=0) - room(cuts["begins"]).max(axis=0)
+        # Of several planes through one line, neighbours count: no other's normal is between theirs.
+        misses = np.zeros(len(area), bool)
+        for name, least in (("between", tiny), ("along", -tiny)):
+            if len(cuts[name][0]):
+                misses |= (room(cuts[name]) < least).any(axis=0)
+        length = np.where(misses, 0.0, np.maximum(length, 0.0)) * np.sqrt(ee)
         area += 0.5 * length * ((d[g] - d[f] * fg / ff) / np.sqrt(gg - fg * fg / ff) + (d[f] - d[g] * fg / gg) / np.sqrt(ff - fg * fg / gg))
     return area
+
+
+@functools.cache
+def _lines(k):
+    """Normals of the faces, and the lines where two faces' planes meet: the faces, products of their normals, and the
+    slabs that cut the line: those that end it, begin it, or run along it with a normal between the two or not."""
+    normals = np.array([[-x for x in a] for a in AXES[k]] + AXES[k], float)
+    gram, lines = normals @ normals.T, []
+    for f, g in itertools.combinations(range(k), 2):
+        e = np.cross(normals[f], normals[g])
+        if not e.any():
+            continue
+        ff, gg, fg = gram[f, f], gram[g, g], gram[f, g]
+        speed, hf, hg = normals @ e, gram[:, f], gram[:, g]
+        others = np.isin(np.arange(k), (f, g), invert=True)
+        inner = (hf * gg > hg * fg) & (hg * ff > hf * fg)
+        cuts = {}
+        for name, which in (("ends", speed > 0.0), ("begins", speed < 0.0), ("between", (speed == 0.0) & inner), ("along", (speed == 0.0) & ~inner)):
+            h = np.flatnonzero(which & others)
+            cuts[name] = h, hf[h, None], hg[h, None], np.where(speed[h] == 0.0, 1.0, speed[h])[:, None]
+        lines.append((f, g, ff, gg, fg, float(e @ e), cuts))
+    return normals, lines

@@ -21,7 +21,7 @@ class BVH(VolumeStructure):
         p = self.primitives
         make = import_module(f".build_{builder}", __package__).build
         if builder == "incremental":
-            self.complete(make(p, order_of(p, order, seed), progress))
+            self.complete(make(p, order_of(p, order, seed), lambda f: progress(0.5 * f)), progress=progress)
             return
         self.frame = Frame.around(p.lo, p.hi)
         boxes = self.frame.boxes(p.lo, p.hi)

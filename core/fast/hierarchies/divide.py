@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from .volume_tree import VolumeTree
+from .volume_tree import VolumeTree, chunks
 
 
 def build(primitives, divide, leaf_size, progress):
@@ -18,6 +18,7 @@ def build(primitives, divide, leaf_size, progress):
     leaf_size : int
         Nodes with more primitives are divided: by number alone, where ``divide`` keeps all together.
     progress : callable
+        Called with 0 to 0.5; the volumes are the other half.
 
     Returns
     -------
@@ -32,7 +33,7 @@ def build(primitives, divide, leaf_size, progress):
         order.append(item[leaf[number]])
         owner.append(begin + number[leaf[number]])
         done += len(order[-1])
-        progress(done / primitives.n)
+        progress(0.5 * done / primitives.n)
         inner = np.flatnonzero(~leaf)
         item, own = item[~leaf[number]], size[inner]
         node = begin + inner
@@ -41,7 +42,12 @@ def build(primitives, divide, leaf_size, progress):
             break
         which = np.repeat(np.arange(len(inner)), own)
         offset = np.cumsum(own) - own
-        part = divide(item, which, offset)
+        parts = []
+        for some in chunks(own):
+            begin_item, end_item = offset[some.start], offset[some.stop - 1] + own[some.stop - 1]
+            parts.append(divide(item[begin_item:end_item], which[begin_item:end_item] - some.start, offset[some] - begin_item))
+            progress(0.5 * done / primitives.n)
+        part = np.concatenate(parts)
         together = np.minimum.reduceat(part, offset) == np.maximum.reduceat(part, offset)
         second_half = np.arange(len(item)) - offset[which] >= (own // 2)[which]
         part = np.where(together[which], second_half, part)

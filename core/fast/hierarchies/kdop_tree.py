@@ -17,4 +17,4 @@ class KDopTree(VolumeStructure):
             axis = np.stack([np.add.reduceat(x * x, offset) for x in away]).argmax(axis=0)
             return (np.stack(away)[axis[which], np.arange(len(item))] > 0.0).astype(np.int64)
 
-        self.complete(divide.build(self.primitives, halves, leaf_size, progress), f"kdop-{k}")
+        self.complete(divide.build(self.primitives, halves, leaf_size, progress), f"kdop-{k}", progress)

@@ -28,4 +28,4 @@ class ObbTree(VolumeStructure):
                 open_ &= ~both
             return part
 
-        self.complete(divide.build(p, halves, leaf_size, progress), "obb")
+        self.complete(divide.build(p, halves, leaf_size, progress), "obb", progress)

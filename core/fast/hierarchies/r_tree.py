@@ -7,6 +7,7 @@ is what rays walk.
 
 import math
 
+from ..structure import no_progress
 from .volume_tree import VolumeStructure, VolumeTree
 
 #: The fewest entries of a node but the root, relative to the most.
@@ -31,8 +32,8 @@ class RTree(VolumeStructure):
             self.inside.add(item)
             self._insert(item)
             if not item % 256:
-                progress(item / p.n)
-        self._finish()
+                progress(0.5 * item / p.n)
+        self._finish(progress)
 
     def insert(self, items):
         """Put primitives back into the tree.
@@ -148,7 +149,7 @@ class RTree(VolumeStructure):
             around[k] = _joined(around[k], box[entry])
         return groups
 
-    def _finish(self):
+    def _finish(self, progress=no_progress):
         """The tree that rays walk, as it is now."""
         if not self.inside:
             self.tree = None
@@ -162,7 +163,7 @@ class RTree(VolumeStructure):
             else:
                 nodes += self.entries[node]
                 parent += [number] * len(self.entries[node])
-        self.complete(VolumeTree.make(parent, order, owner, [False] * len(nodes)))
+        self.complete(VolumeTree.make(parent, order, owner, [False] * len(nodes)), progress=progress)
 
     def traverse(self, rays, query):
         if self.tree is not None:

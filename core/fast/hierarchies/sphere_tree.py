@@ -18,4 +18,4 @@ class SphereTree(VolumeStructure):
             right = c > middle[:, which]
             return right[0] + 2 * right[1] + 4 * right[2]
 
-        self.complete(divide.build(self.primitives, octants, leaf_size, progress), "sphere")
+        self.complete(divide.build(self.primitives, octants, leaf_size, progress), "sphere", progress)

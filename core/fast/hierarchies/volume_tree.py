@@ -17,10 +17,12 @@ from ...errors import SceneError
 from ...hits import Cells
 from ..bounds import maker
 from ..primitives import Primitives
-from ..structure import Structure
+from ..structure import Structure, no_progress
 
 #: Rays that walk together: the lists that wait should stay in the caches.
 RAYS = 16_384
+#: Primitives whose nodes are worked on together.
+CHUNK = 16_384
 
 
 @dataclass
@@ -126,6 +128,15 @@ class VolumeTree:
         return sum(a.nbytes for a in (self.parent, self.level, self.child, self.children, self.first, self.count, self.bare, self.order))
 
 
+def chunks(count):
+    """Slices of nodes that hold about `CHUNK` primitives together, so that long work can report its progress."""
+    ends, begin = np.cumsum(np.maximum(count, 16)), 0
+    while begin < len(count):
+        end = max(begin + 1, int(np.searchsorted(ends, (ends[begin - 1] if begin else 0) + CHUNK, side="right")))
+        yield slice(begin, end)
+        begin = end
+
+
 def places(start, size):
     """All positions of ranges, range by range, and where each range begins among them."""
     ends = np.cumsum(size)
@@ -142,42 +153,55 @@ class VolumeStructure(Structure):
     tree : VolumeTree
     volumes : Volumes
         One a node; bare leaves have their parents'.
+    area : ndarray, shape (m,)
+        Their surface areas.
     """
 
-    def complete(self, tree, volume="aabb"):
-        """Take over a tree, put volumes around its nodes, and measure."""
+    def complete(self, tree, volume="aabb", progress=no_progress):
+        """Take over a tree, put volumes around its nodes (the second half of the progress), and measure."""
         self.tree, self.volume = tree, volume
         fit = maker(volume)
-        self._put_volumes(lambda node, item, offset: fit(self.primitives, item, offset))
+        self._put_volumes(lambda node, item, offset: fit(self.primitives, item, offset), lambda f: progress(0.5 + 0.5 * f))
         self.measure()
 
-    def _put_volumes(self, around):
+    def _put_volumes(self, around, progress=no_progress):
         """Volumes around all nodes; ``around(node, item, offset)`` makes those of some nodes around their primitives."""
         tree = self.tree
-        levels = tree.levels()
-        parts = []
-        for begin, end in reversed(levels):
-            node = np.arange(begin, end)
-            if not (parts and parts[-1].JOINS):
-                parts.append(around(node, *tree.segments(node)))
-                continue
-            # Leaves around primitives, the others around their children, which stand together.
-            inner = np.flatnonzero(~tree.leaf[begin:end])
-            joined = parts[-1].joined(tree.child[begin + inner] - end)
-            if len(inner) < len(node):
-                leaf = node[tree.leaf[begin:end]]
-                joined = joined.concatenated([joined, around(leaf, *tree.segments(leaf))])
-                joined = joined.take(np.argsort(np.concatenate([begin + inner, leaf])))
-            parts.append(joined)
-        self.volumes = parts[0].concatenated(parts[::-1])
+        parts, areas = [], []
+        for begin, end in reversed(tree.levels()):
+            below, level, sizes = parts[-1] if parts else None, [], []
+            for some in chunks(tree.count[begin:end]):
+                node = np.arange(begin + some.start, begin + some.stop)
+                level.append(self._some_volumes(node, end, below, around))
+                sizes.append(level[-1].area())
+                progress(1.0 - (begin + some.start) / len(tree.parent))
+            parts.append(level[0].concatenated(level))
+            areas.append(np.concatenate(sizes))
+        self.volumes, self.area = parts[0].concatenated(parts[::-1]), np.concatenate(areas[::-1])
         if tree.any_bare:
             bare = tree.bare
-            self.volumes = self.volumes.take(np.where(bare, tree.parent, np.arange(len(bare))))
+            own = np.where(bare, tree.parent, np.arange(len(bare)))
+            self.volumes, self.area = self.volumes.take(own), self.area[own]
+
+    def _some_volumes(self, node, end, below, around):
+        """Volumes around some nodes of a level, behind which the next begins at `end`, with the volumes `below`."""
+        tree = self.tree
+        leaf = tree.leaf[node]
+        if below is None or not below.JOINS or leaf.all():
+            return around(node, *tree.segments(node))
+        # Leaves around primitives, the others around their children, which stand together.
+        inner, leaf = np.flatnonzero(~leaf), np.flatnonzero(leaf)
+        child = tree.child[node[inner]] - end
+        joined = below.take(np.arange(child[0], child[-1] + tree.children[node[inner[-1]]])).joined(child - child[0])
+        if not len(leaf):
+            return joined
+        joined = joined.concatenated([joined, around(node[leaf], *tree.segments(node[leaf]))])
+        return joined.take(np.argsort(np.concatenate([inner, leaf])))
 
     def measure(self):
         """Fill in the figures."""
         tree, leaf = self.tree, self.tree.leaf
-        area = self.volumes.area()
+        area = self.area
         root = float(area[0]) if area[0] > 0.0 else 1.0
         tested = np.where(leaf, tree.count, tree.children - np.bincount(tree.parent[tree.bare], minlength=len(leaf)))
         self.figures.update(
@@ -195,7 +219,7 @@ class VolumeStructure(Structure):
         tree = self.tree
         item, offset = tree.segments(np.arange(len(tree.parent)))
         lo, hi = (f.reduceat(edge[item], offset) for f, edge in ((np.minimum, self.primitives.lo), (np.maximum, self.primitives.hi)))
-        return Cells.make(lo, hi, tree.level, tree.count, tree.leaf, tree.parent, *self.volumes.drawn(), self.volumes.area())
+        return Cells.make(lo, hi, tree.level, tree.count, tree.leaf, tree.parent, *self.volumes.drawn(), self.area)
 
     def refit(self, scene):
         """Follow motion: the same tree, its volumes fitted to where the primitives are now.
