@@ -40,7 +40,10 @@ class Sweep:
         self.size = max(1, round(width * scale)), max(1, round(height * scale))
         self.scene = read_scene(context.evaluated_depsgraph_get(), for_render=True, size=self.size)
         if self.scene.camera is None:
-            raise SceneError(f"{scene.name}: there is no camera to see it from. Add one, then View > Cameras > Set Active Object as Camera.")
+            raise SceneError(
+                f"{scene.name}: there is no camera to see it from. "
+                "Add one, then View > Cameras > Set Active Object as Camera."
+            )
         self.estimate = Estimate(seconds, 100e6, self.scene.n_primitives, 0)
         self.files, self.note = [], ""
 
@@ -49,7 +52,9 @@ class Sweep:
 
         result = error_time.error_time(self.scene, self.size, self.seconds, progress=progress)
         self.folder = tempfile.TemporaryDirectory(prefix="rayscope-")
-        files, self.note = error_time.write(result, self.folder.name, f"{self.scene.name}, {self.size[0]} x {self.size[1]} pixels")
+        files, self.note = error_time.write(
+            result, self.folder.name, f"{self.scene.name}, {self.size[0]} x {self.size[1]} pixels"
+        )
         self.files = [f for f in files if f.suffix == ".png"]
         self.result = result
         return result
@@ -58,11 +63,18 @@ class Sweep:
 class RAYSCOPE_OT_error(Work, bpy.types.Operator):
     bl_idname = "rayscope.error"
     bl_label = "Error Against Run Time"
-    bl_description = ("Trace small pictures with many settings and compare each with an exact one: which setting is the cheapest "
-                      "for the error wanted. The plots become images")
+    bl_description = (
+        "Trace small pictures with many settings and compare each with an exact one: which setting is the cheapest "
+        "for the error wanted. The plots become images"
+    )
 
-    seconds: IntProperty(name="Seconds", description="About how long it may take; decides how fine the settings are that are tried",
-                         default=120, min=1, max=100_000)
+    seconds: IntProperty(
+        name="Seconds",
+        description="About how long it may take; decides how fine the settings are that are tried",
+        default=120,
+        min=1,
+        max=100_000,
+    )
     side: IntProperty(name="Longer Side", description="Of the pictures, in pixels", default=96, min=4, max=4096)
 
     title = "Measuring"
@@ -88,7 +100,11 @@ class RAYSCOPE_OT_error(Work, bpy.types.Operator):
         result = getattr(task, "result", None)
         if result is None:
             return "Measuring was stopped before there was anything to compare with"
-        _words[task.uid] = [*result["words"], *(f"Left out: {line}" for line in result["left_out"]), *([task.note] if task.note else [])]
+        _words[task.uid] = [
+            *result["words"],
+            *(f"Left out: {line}" for line in result["left_out"]),
+            *([task.note] if task.note else []),
+        ]
         for file in task.files:
             put(file)
         task.folder.cleanup()

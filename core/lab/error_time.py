@@ -1,4 +1,4 @@
-"""Error against run time: what each setting of the tracer costs and how wrong its picture is (a work-precision diagram).
+"""Error against run time: what each setting costs and how wrong its picture is (a work-precision diagram).
 
 Every knob that the scene has something for is swept, each setting traced several times, turn by turn with all others.
 The reference is a picture with at least `FINER` times the samples of the finest setting, in two halves with different
@@ -29,8 +29,9 @@ MOST, FEWEST = 1024, 2
 FEWEST_POINTS = 4
 #: Timed runs of each setting.
 REPEATS = 3
-#: What ends the paths in all pictures that are not about that, without a bias.
-UNBIASED = {"depth": 200, "threshold": 0.003, "roulette": True}
+#: What ends the paths in all pictures that are not about that, without a bias, and the depths that are tried.
+UNBIASED = {"threshold": 0.003, "roulette": True}
+DEPTHS = (8, 16, 32, 64, 128, 256)
 COLUMNS = ("curve", "setting", "T", "T_worst", "runs", "rays", "tests", *MEASURES, "verdict")
 
 
@@ -116,7 +117,10 @@ def error_time(scene, size=(96, 72), seconds=120.0, seed=0, technique="bvh", pro
         When stopped before there was a reference.
     """
     if not scene.n_primitives:
-        raise SceneError(f"{scene.name}: there is nothing to trace: no object with a surface. Add a mesh, or check what is hidden in renders.")
+        raise SceneError(
+            f"{scene.name}: there is nothing to trace: no object with a surface. "
+            "Add a mesh, or check what is hidden in renders."
+        )
     sweep = _Sweep(scene, size, seconds, seed, technique, progress, say)
     return sweep.run()
 
@@ -125,11 +129,18 @@ class _Sweep:
     """The run of :func:`error_time`."""
 
     def __init__(self, scene, size, seconds, seed, technique, progress, say):
-        self.size, self.seconds, self.seed, self.technique, self.progress, self.say = size, seconds, seed, technique, progress, say
+        self.size, self.seconds, self.seed, self.technique, self.progress, self.say = (
+            size,
+            seconds,
+            seed,
+            technique,
+            progress,
+            say,
+        )
         self.scenes, self.indices = {0: scene}, {0: build(scene, technique)}
         self.began = time.perf_counter()
-        self.full = UNBIASED if any(m.reflects or m.transparent for m in scene.used_materials()) else {"depth": 0}
         self.done, self.total = 0.0, 1.0
+        self.full = self._deep_enough()
 
     def run(self):
         """See :func:`error_time`."""
@@ -140,7 +151,10 @@ class _Sweep:
         work = [self._work(s, finest) for s in settings]
         self.total = FINER * finest + (1.5 + REPEATS) * sum(work)
         self.say(f"{len(settings)} settings up to {finest} samples a pixel; reference with {FINER * finest}")
-        halves = [self._traced({**self.full, "samples": FINER * finest // 2}, self.seed + 1 + k, work=FINER * finest / 2) for k in (0, 1)]
+        halves = [
+            self._traced({**self.full, "samples": FINER * finest // 2}, self.seed + 1 + k, work=FINER * finest / 2)
+            for k in (0, 1)
+        ]
         images = [np.asarray(h.image, float) for h in halves]
         reference = 0.5 * (images[0] + images[1])
         floor = 0.5 * math.sqrt(np.mean((displayed(images[0]) - displayed(images[1])) ** 2))
@@ -160,12 +174,29 @@ class _Sweep:
         return {
             "rows": [s.row() for s in settings],
             "floor": floor,
-            "reference": {"samples": FINER * finest, "options": self.full, "seeds": [self.seed + 1, self.seed + 2],
-                          "T": sum(h.figures["T_R"] for h in halves)},
+            "reference": {
+                "samples": FINER * finest,
+                "options": self.full,
+                "seeds": [self.seed + 1, self.seed + 2],
+                "T": sum(h.figures["T_R"] for h in halves),
+            },
             "left_out": left_out,
             "words": words,
             "stopped": stopped,
         }
+
+    def _deep_enough(self):
+        """Options that follow all paths: so deep that twice as deep the picture is the same, to a quarter of 1/255."""
+        if not any(m.reflects or m.transparent for m in self.scenes[0].used_materials()):
+            return {"depth": 0}
+        before = None
+        for depth in DEPTHS:
+            image = displayed(self._traced({**UNBIASED, "depth": depth, "samples": 1}, self.seed, work=0).image)
+            if before is not None and math.sqrt(np.mean((image - before) ** 2)) < STEP / 4.0:
+                depth //= 2
+                break
+            before = image
+        return {**UNBIASED, "depth": depth}
 
     def _cost_of_a_sample(self):
         """Seconds of one sample of all pixels."""
@@ -174,11 +205,20 @@ class _Sweep:
 
     def _traced(self, options, seed, scene=0, count=False, work=0.0):
         """A picture; raises Cancelled when stopped."""
+
         def progress(fraction):
             if self.progress:
                 self.progress(min(1.0, (self.done + fraction * work) / self.total))
 
-        result = trace(self.scenes[scene], index=self.indices[scene], size=self.size, seed=seed, count=count, progress=progress, **options)
+        result = trace(
+            self.scenes[scene],
+            index=self.indices[scene],
+            size=self.size,
+            seed=seed,
+            count=count,
+            progress=progress,
+            **options,
+        )
         if result.cancelled:
             raise Cancelled("stopped.")
         self.done += work
@@ -198,23 +238,42 @@ class _Sweep:
         if levels >= 1:
             for way in ("corners", "variance"):
                 base = {"antialiasing": way, "aa_level": levels}
-                curve("antialiasing", f"{way}, 4^{levels} samples at most",
-                      [(f"aa_threshold {t:g}", {"aa_threshold": t}) for t in (0.3, 0.1, 0.03, 0.01)], **base)
+                curve(
+                    "antialiasing",
+                    f"{way}, 4^{levels} samples at most",
+                    [(f"aa_threshold {t:g}", {"aa_threshold": t}) for t in (0.3, 0.1, 0.03, 0.01)],
+                    **base,
+                )
         else:
-            left_out.append("adaptive antialiasing: it needs 4 samples a pixel; there is time for fewer. Give more --seconds, or a smaller --size.")
+            left_out.append(
+                "adaptive antialiasing: it needs 4 samples a pixel; there is time for fewer. "
+                "Give more --seconds, or a smaller --size."
+            )
         some = max(finest // 4, 2)
         if any(m.reflects for m in materials):
-            curve("depth", f"maximum depth, {some} samples",
-                  [(f"depth {d}", {"depth": d, "threshold": 0.0, "roulette": False}) for d in (0, 1, 2, 4, 6)], samples=some)
+            curve(
+                "depth",
+                f"maximum depth, {some} samples",
+                [(f"depth {d}", {"depth": d, "threshold": 0.0, "roulette": False}) for d in (0, 1, 2, 4, 6)],
+                samples=some,
+            )
             for roulette in (False, True):
-                curve("depth", f"adaptive depth{' with roulette' if roulette else ''}, {some} samples",
-                      [(f"threshold {t:g}", {"threshold": t, "roulette": roulette}) for t in (0.3, 0.1, 0.03, 0.01)], samples=some)
+                curve(
+                    "depth",
+                    f"adaptive depth{' with roulette' if roulette else ''}, {some} samples",
+                    [(f"threshold {t:g}", {"threshold": t, "roulette": roulette}) for t in (0.3, 0.1, 0.03, 0.01)],
+                    samples=some,
+                )
         else:
             left_out.append("maximum depth, adaptive depth: the scene has no mirrors and no glass.")
         if any(light.has_extent and any(light.colour) for light in scene.lights):
             few = max(finest // 8, 2)
-            curve("shadows", f"shadow rays to each light, {few} samples",
-                  [(f"{n} shadow rays", {"light_samples": n}) for n in (1, 2, 4, 8) if n * few <= 2 * finest], samples=few)
+            curve(
+                "shadows",
+                f"shadow rays to each light, {few} samples",
+                [(f"{n} shadow rays", {"light_samples": n}) for n in (1, 2, 4, 8) if n * few <= 2 * finest],
+                samples=few,
+            )
         else:
             left_out.append("shadow rays to each light: no light of the scene has an extent.")
         self._tessellations(settings, left_out, finest)
@@ -235,7 +294,15 @@ class _Sweep:
         for n in (8, 16, 32, 64):
             self.scenes[n] = tessellated(self.scenes[0], n)
             self.indices[n] = build(self.scenes[n], self.technique)
-            settings.append(Setting(f"tessellation, {finest} samples", f"{n} segments", "tessellation", {**self.full, "samples": finest}, scene=n))
+            settings.append(
+                Setting(
+                    f"tessellation, {finest} samples",
+                    f"{n} segments",
+                    "tessellation",
+                    {**self.full, "samples": finest},
+                    scene=n,
+                )
+            )
 
     @staticmethod
     def _work(setting, finest):
@@ -262,7 +329,9 @@ class _Sweep:
                     self.done += work[i] * (1.5 if turn == 0 else 1.0)
                     continue
                 start = time.perf_counter()
-                result = self._traced(setting.options, self.seed, setting.scene, turn == 0, work[i] * (1.5 if turn == 0 else 1.0))
+                result = self._traced(
+                    setting.options, self.seed, setting.scene, turn == 0, work[i] * (1.5 if turn == 0 else 1.0)
+                )
                 spent[i] = time.perf_counter() - start
                 if turn == 0:
                     kinds = [f for f in result.figures.values() if isinstance(f, dict)]
@@ -271,14 +340,20 @@ class _Sweep:
                     setting.error = errors(result.image, reference)
                 else:
                     setting.times.append(result.figures["T_R"])
-            self.say(f"{'counted' if turn == 0 else f'timed, {turn} of {REPEATS}'}: {time.perf_counter() - self.began:.0f} s")
+            self.say(
+                f"{'counted' if turn == 0 else f'timed, {turn} of {REPEATS}'}: {time.perf_counter() - self.began:.0f} s"
+            )
 
 
 def _judged(settings, floor):
     """Mark settings that are never worth it, and say in words what came out."""
     words = []
     for s in settings:
-        better = [o for o in settings if o.knob == s.knob and max(o.times) < min(s.times) and o.error["rmse"] < s.error["rmse"]]
+        better = [
+            o
+            for o in settings
+            if o.knob == s.knob and max(o.times) < min(s.times) and o.error["rmse"] < s.error["rmse"]
+        ]
         if better:
             best = min(better, key=lambda o: o.error["rmse"])
             s.verdict = f"dominated by {best.curve}: {best.label}"
@@ -287,24 +362,36 @@ def _judged(settings, floor):
     enough = [s for s in settings if s.error["rmse"] <= STEP]
     best = min(settings, key=lambda s: s.error["rmse"])
     if floor > STEP:
-        words.append(f"The reference's own error, {floor:.2g}, is above 1/255 = {STEP:.2g}: what reaches 1/255 cannot be told. "
-                     "Give more --seconds, or a smaller --size.")
+        words.append(
+            f"The reference's own error, {floor:.2g}, is above 1/255 = {STEP:.2g}: what reaches 1/255 cannot be told. "
+            "Give more --seconds, or a smaller --size."
+        )
     elif enough:
         s = min(enough, key=lambda s: min(s.times))
-        words.append(f"For an error of 1/255 the cheapest setting is {s.curve}: {s.label} (RMSE {s.error['rmse']:.2g}, "
-                     f"{min(s.times):.3g} s, {s.rays:,} rays).")
+        words.append(
+            f"For an error of 1/255 the cheapest setting is {s.curve}: {s.label} (RMSE {s.error['rmse']:.2g}, "
+            f"{min(s.times):.3g} s, {s.rays:,} rays)."
+        )
     else:
         words.append(f"No setting reached an error of 1/255 = {STEP:.2g}. Give more --seconds, or a smaller --size.")
-    words.append(f"The least error, {best.error['rmse']:.2g}, has {best.curve}: {best.label} ({min(best.times):.3g} s)"
-                 + (", which the reference's own error of " f"{floor:.2g} does not let one tell from less." if best.error["rmse"] < 2.0 * floor
-                    else f"; the reference's own error is {floor:.2g}."))
+    words.append(
+        f"The least error, {best.error['rmse']:.2g}, has {best.curve}: {best.label} ({min(best.times):.3g} s)"
+        + (
+            f", which the reference's own error of {floor:.2g} does not let one tell from less."
+            if best.error["rmse"] < 2.0 * floor
+            else f"; the reference's own error is {floor:.2g}."
+        )
+    )
     never = {}
     for s in settings:
         if s.verdict:
             never.setdefault(s.curve, []).append(s.label)
     if never:
-        words.append("Never worth it, because another setting of the same knob is both faster and more exact: "
-                     + "; ".join(f"{curve}: {', '.join(labels)}" for curve, labels in never.items()) + ".")
+        words.append(
+            "Never worth it, because another setting of the same knob is both faster and more exact: "
+            + "; ".join(f"{curve}: {', '.join(labels)}" for curve, labels in never.items())
+            + "."
+        )
     return words
 
 
@@ -379,6 +466,7 @@ def write(result, folder, title):
 
 def _page(result, title, pictures, note):
     """One HTML page with everything in it."""
+
     def cell(row, column):
         value = row.get(column)
         kind = "" if isinstance(value, str) else " class=n"
@@ -386,13 +474,17 @@ def _page(result, title, pictures, note):
 
     head = "".join(f"<th title='{html.escape(MEASURES.get(c, c))}'>{c}</th>" for c in COLUMNS)
     body = "".join(f"<tr>{''.join(cell(r, c) for c in COLUMNS)}</tr>" for r in result["rows"])
-    images = "".join(f"<img alt='{p.stem}' src='data:image/png;base64,{base64.b64encode(p.read_bytes()).decode()}'>" for p in pictures)
+    images = "".join(
+        f"<img alt='{p.stem}' src='data:image/png;base64,{base64.b64encode(p.read_bytes()).decode()}'>"
+        for p in pictures
+    )
     lines = "".join(f"<p>{html.escape(line)}</p>" for line in [*result["words"], *([note] if note else [])])
     left = "".join(f"<li>{html.escape(line)}</li>" for line in result["left_out"])
     return f"""<!doctype html><html lang=en><meta charset=utf-8><meta name=viewport content="width=device-width">
 <title>{html.escape(title)}</title>
 <style>body{{font:16px/1.5 system-ui,sans-serif;max-width:1100px;margin:2em auto;padding:0 1em}}img{{max-width:100%}}
-table{{border-collapse:collapse;font-size:13px;display:block;overflow-x:auto}}td,th{{padding:.2em .6em;text-align:left;border-bottom:1px solid #ddd}}
+table{{border-collapse:collapse;font-size:13px;display:block;overflow-x:auto}}
+td,th{{padding:.2em .6em;text-align:left;border-bottom:1px solid #ddd}}
 td.n{{text-align:right}}</style>
 <h1>Error against run time</h1><p>{html.escape(title)}</p>{lines}{images}
 <table><tr>{head}</tr>{body}</table><h2>Left out</h2><ul>{left}</ul></html>

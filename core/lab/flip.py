@@ -1,7 +1,7 @@
 """FLIP: how different two pictures look when one flips between them.
 
-Andersson et al., FLIP: A Difference Evaluator for Alternating Images, 2020. Colours are blurred as the eye blurs them at
-that distance, compared in a space of perceived differences, and amplified where edges and points differ.
+Andersson et al., FLIP: A Difference Evaluator for Alternating Images, 2020. Colours are blurred as the eye does at that
+distance, compared in a space of perceived differences, and amplified where edges and points differ.
 """
 
 import math
@@ -19,11 +19,13 @@ Q_COLOUR, Q_FEATURE, P_COLOUR, P_TOP = 0.7, 0.5, 0.4, 0.95
 FEATURE = 0.082
 
 #: Linear sRGB to XYZ, and the white that it gives.
-XYZ = np.array([
-    [10135552 / 24577794, 8788810 / 24577794, 4435075 / 24577794],
-    [2613072 / 12288897, 8788810 / 12288897, 887015 / 12288897],
-    [1425312 / 73733382, 8788810 / 73733382, 70074185 / 73733382],
-])
+XYZ = np.array(
+    [
+        [10135552 / 24577794, 8788810 / 24577794, 4435075 / 24577794],
+        [2613072 / 12288897, 8788810 / 12288897, 887015 / 12288897],
+        [1425312 / 73733382, 8788810 / 73733382, 70074185 / 73733382],
+    ]
+)
 WHITE = XYZ.sum(axis=1)
 
 

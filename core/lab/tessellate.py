@@ -74,4 +74,6 @@ def _mesh(solid, segments):
                 triangles = np.concatenate([triangles, fan])
                 corner_normals = np.concatenate([corner_normals, np.broadcast_to((0.0, 0.0, side), (segments, 3, 3))])
     slot = np.full(len(triangles), getattr(solid, "slot", 0), np.int32)
-    return Mesh(points, triangles, slots=slot, corner_normals=corner_normals.astype(np.float32), name=solid.name or solid.kind)
+    return Mesh(
+        points, triangles, slots=slot, corner_normals=corner_normals.astype(np.float32), name=solid.name or solid.kind
+    )

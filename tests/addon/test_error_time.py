@@ -1,4 +1,5 @@
 """The sweep of error against run time, from Blender: its images, its words, and the settings that trace fewer rays."""
+
 import bpy
 import pytest
 from bl_ext.user_default.rayscope.addon import tasks

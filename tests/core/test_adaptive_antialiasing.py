@@ -19,7 +19,11 @@ def half(slope=0.0, colour=(1, 1, 1)):
     glow = Material("glow", diffuse=0, ambient=0, emission=colour)
     camera = Camera(np.eye(4), (-0.5, 0.5, -0.5, 0.5), "orthographic")
     camera.matrix[2, 3] = 5
-    return Scene([Object("half", Mesh(corners, [(0, 1, 2), (0, 2, 3)]), materials=(glow,))], camera=camera, world=World((0, 0, 0)))
+    return Scene(
+        [Object("half", Mesh(corners, [(0, 1, 2), (0, 2, 3)]), materials=(glow,))],
+        camera=camera,
+        world=World((0, 0, 0)),
+    )
 
 
 def lit():
@@ -27,7 +31,11 @@ def lit():
     return Scene(
         [
             Object("floor", Mesh(np.array([(-9, -9, 0), (9, -9, 0), (0, 15, 0)], float), [(0, 1, 2)])),
-            Object("mirror", Mesh(np.array([(-2, 2, 0), (3, 2, 0), (0, 3, 4)], float), [(0, 1, 2)]), materials=(Material("m", mirror=0.7),)),
+            Object(
+                "mirror",
+                Mesh(np.array([(-2, 2, 0), (3, 2, 0), (0, 3, 4)], float), [(0, 1, 2)]),
+                materials=(Material("m", mirror=0.7),),
+            ),
         ],
         [Light("lamp", "point", (50, 50, 50), (3, -3, 4), radius=0.4)],
         Camera.look_at((0, -6, 3), (0, 0, 0.6), angle=math.radians(40), aspect=4 / 3),
@@ -46,7 +54,8 @@ def reference(size):
 @pytest.mark.parametrize("region", [None, (1, 2, 13, 9)])
 def test_both_cores_take_the_same_samples(way, region):
     fast, pure = (
-        trace(lit(), "brute", core, (18, 10), 2, seed=5, region=region, antialiasing=way, count=True) for core in ("fast", "pure")
+        trace(lit(), "brute", core, (18, 10), 2, seed=5, region=region, antialiasing=way, count=True)
+        for core in ("fast", "pure")
     )
     assert fast.passes.keys() == pure.passes.keys()
     for name in fast.passes:
@@ -75,11 +84,11 @@ def test_a_picture_of_one_colour_needs_its_corners_only(core):
 
 @CORES
 def test_corners_by_hand(core):
-    """Two pixels; the edge at 0.35 of the left one: its corners differ, and at each level those of two squares a row do."""
+    """Two pixels; the edge at 0.35 of the left one: its corners differ, and so do those of a column of squares inside."""
     scene = half()
     scene.camera.window = (-0.35, 1.65, 0, 1)
     result = trace(scene, "brute", core, (2, 1), antialiasing="corners", aa_level=2)
-    # Lattice columns at 0, 1/4, 1/2, .. of the left pixel: those at 0, 1/4 are white. Squares 0-1/4 are white, 1/4-1/2 half.
+    # Points at 0 and 1/4 of the left pixel are white: squares up to 1/4 are white, those to 1/2 half.
     np.testing.assert_allclose(result.image[0, :, 0], [0.25 + 0.125, 0.0], atol=1e-7)
     # 6 corners; 5 points at 1/2; then on the left half two squares with 5 points each, of which 1 is shared.
     assert result.figures["primary"]["rays"] == 6 + 5 + 5 + 4
@@ -199,7 +208,8 @@ def test_tiles_tell_what_has_become_better(way):
 
 
 @pytest.mark.parametrize(
-    "bad", [{"antialiasing": "none"}, {"aa_level": 0}, {"aa_level": 1.5}, {"aa_threshold": -1}, {"aa_threshold": math.nan}]
+    "bad",
+    [{"antialiasing": "none"}, {"aa_level": 0}, {"aa_level": 1.5}, {"aa_threshold": -1}, {"aa_threshold": math.nan}],
 )
 def test_impossible_values(bad):
     with pytest.raises(ParameterError, match=next(iter(bad))):
@@ -216,6 +226,9 @@ def test_shadow_rays_to_a_light_count_and_smooth():
     assert 2.5 * once.figures["shadow"]["rays"] < fast.figures["shadow"]["rays"] < 3.5 * once.figures["shadow"]["rays"]
     assert fast.figures["primary"] == once.figures["primary"]
     # The floor's penumbra, through pixel centres, so that lights alone make noise.
-    runs = {n: np.stack([trace(scene, size=(20, 15), depth=0, light_samples=n, seed=s).image for s in range(8)]) for n in (4, 16)}
+    runs = {
+        n: np.stack([trace(scene, size=(20, 15), depth=0, light_samples=n, seed=s).image for s in range(8)])
+        for n in (4, 16)
+    }
     noise = {n: math.sqrt(np.mean(images.var(axis=0))) for n, images in runs.items()}
     assert 0.35 < noise[16] / noise[4] < 0.7

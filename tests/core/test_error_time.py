@@ -57,7 +57,10 @@ def test_uniform_sampling_converges_as_the_root_of_the_samples():
     reference = sum(np.asarray(trace(scene, size=size, samples=512, seed=s).image, float) for s in (90, 91)) / 2
     rmse = []
     for n in counts:
-        squares = [np.mean((displayed(trace(scene, size=size, samples=n, seed=s).image) - displayed(reference)) ** 2) for s in range(4)]
+        squares = [
+            np.mean((displayed(trace(scene, size=size, samples=n, seed=s).image) - displayed(reference)) ** 2)
+            for s in range(4)
+        ]
         rmse.append(math.sqrt(np.mean(squares)))
     slope = np.polyfit(np.log(counts), np.log(rmse), 1)[0]
     assert -0.575 < slope < -0.425
@@ -65,8 +68,13 @@ def test_uniform_sampling_converges_as_the_root_of_the_samples():
 
 def test_tessellations_come_closer_to_the_solids():
     scene = Scene(
-        solids=[solids.sphere((0, 0, 0), 1.0), solids.cylinder((2, 0, -1), (2, 0.5, 1), 0.5), solids.cone((-2, 0, -1), (-2, 0, 1), 0.8, 0.3),
-                solids.cone((0, 0, 1.2), (0, 0, 2), 0.4), solids.box((-1, -3, -1), (1, -2.5, -0.5))],
+        solids=[
+            solids.sphere((0, 0, 0), 1.0),
+            solids.cylinder((2, 0, -1), (2, 0.5, 1), 0.5),
+            solids.cone((-2, 0, -1), (-2, 0, 1), 0.8, 0.3),
+            solids.cone((0, 0, 1.2), (0, 0, 2), 0.4),
+            solids.box((-1, -3, -1), (1, -2.5, -0.5)),
+        ],
         lights=[Light("sun", "sun", (3, 3, 3), direction=(-0.4, 0.5, -0.77))],
         camera=Camera.look_at((0.5, -8, 2.5), (0, 0, 0.2), angle=math.radians(40), aspect=4 / 3),
     )
@@ -93,8 +101,16 @@ def swept():
 
 def test_every_knob_the_scene_has_something_for_is_swept(swept):
     curves = {r["curve"].split(",")[0] for r in swept["rows"]}
-    assert curves == {"samples", "corners", "variance", "maximum depth", "adaptive depth", "adaptive depth with roulette",
-                      "shadow rays to each light", "tessellation"}
+    assert curves == {
+        "samples",
+        "corners",
+        "variance",
+        "maximum depth",
+        "adaptive depth",
+        "adaptive depth with roulette",
+        "shadow rays to each light",
+        "tessellation",
+    }
     for row in swept["rows"]:
         assert set(lab.COLUMNS) <= set(row)
         assert 0 < row["T"] <= row["T_worst"] and len(row["times"]) == row["runs"] >= 1
@@ -163,6 +179,7 @@ def test_stopping():
         def progress(fraction):
             if fraction > limit:
                 raise Cancelled("enough")
+
         return progress
 
     with pytest.raises(Cancelled):
@@ -178,8 +195,10 @@ def test_an_empty_scene():
 
 def test_command(tmp_path, capsys):
     nff = tmp_path / "scene.nff"
-    nff.write_text("v\nfrom 0 -6 3\nat 0 0 0.6\nup 0 0 1\nangle 40\nhither 0.1\nresolution 16 12\nb 0.2 0.3 0.5\nl 3 -3 4\n"
-                   "f 0.8 0.6 0.4 0.7 0.3 10 0 1\ns 0 0 0.7 0.7\n")
+    nff.write_text(
+        "v\nfrom 0 -6 3\nat 0 0 0.6\nup 0 0 1\nangle 40\nhither 0.1\nresolution 16 12\nb 0.2 0.3 0.5\nl 3 -3 4\n"
+        "f 0.8 0.6 0.4 0.7 0.3 10 0 1\ns 0 0 0.7 0.7\n"
+    )
     out = tmp_path / "out"
     assert main(["error", str(nff), "--out", str(out), "--seconds", "2", "--size", "12x9", "--json"]) == 0
     printed = json.loads(capsys.readouterr().out)
@@ -203,3 +222,17 @@ def test_without_matplotlib_the_rest_is_written(tmp_path, monkeypatch, swept):
     files, note = lab.write(swept, tmp_path, "room")
     assert "matplotlib" in note and sorted(f.name for f in files) == ["error.csv", "error.html"]
     assert "pip install matplotlib" in (tmp_path / "error.html").read_text()
+
+
+@pytest.mark.parametrize("share, least", [(0.0, 0), (0.3, 8), (0.9, 32)])
+def test_paths_are_followed_until_nothing_changes(share, least):
+    """Two facing mirrors: what is left after depth d weighs share ** d."""
+    mirror = Material("mirror", (0, 0, 0), ambient=0, diffuse=0, mirror=share, emission=(0.05,) * 3)
+    walls = [
+        Object("m", Mesh(np.array([(-9, -9, z), (9, -9, z), (0, 9, z)], float), [(0, 1, 2)]), materials=(mirror,))
+        for z in (-1, 1)
+    ]
+    scene = Scene(walls, camera=Camera.look_at((0, 0, 0), (0.1, 0, 1), angle=0.2), world=World((0, 0, 0)))
+    sweep = lab._Sweep(scene, (6, 4), 1.0, 0, "bvh", None, print)
+    assert sweep.full["depth"] >= least and share ** sweep.full["depth"] < 0.05 or share == 0.0 == sweep.full["depth"]
+    assert sweep.full["depth"] <= 8 * least

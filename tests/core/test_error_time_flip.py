@@ -7,7 +7,7 @@ from rayscope.core.lab.flip import flip
 
 
 def pairs():
-    """Pictures and others that differ from them, in linear RGB: noise, a shape, a shift, nothing alike, black and white."""
+    """Pictures and others that differ from them, in linear RGB."""
     rng = np.random.default_rng(1)
     noise = rng.random((40, 50, 3)) ** 2
     shape = np.full((40, 50, 3), 0.3)

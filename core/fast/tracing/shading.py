@@ -21,8 +21,8 @@ def lit(table, surface, d, lights, transmitted, key, check):
     lights : list of (Light, float)
         Each with the share of it that is to be added: a light that is sampled n times is there n times, by 1 / n.
     transmitted : callable
-        ``transmitted(surface, which, to, reach, light)``: the share of light, shape (m,) or (3, m), that comes through to
-        the points `which` from `to`.
+        ``transmitted(surface, which, to, reach, light)``: the share of light, shape (m,) or (3, m), that comes
+        through to the points `which` from `to`.
     key : ndarray of uint64, or None
         Keys of the rays, where lights have an extent to be sampled.
     check : callable

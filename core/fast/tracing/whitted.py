@@ -105,8 +105,18 @@ class Whitted:
     tile_side = TILE
 
     def __init__(
-        self, scene, structures, size, depth, samples, seed, count, check, threshold=0.0, roulette=False,
-        light_samples=1
+        self,
+        scene,
+        structures,
+        size,
+        depth,
+        samples,
+        seed,
+        count,
+        check,
+        threshold=0.0,
+        roulette=False,
+        light_samples=1,
     ):
         self.scene, self.size, self.depth, self.samples, self.seed, self.count = (
             scene,

@@ -88,8 +88,18 @@ class Whitted:
     tile_side = TILE
 
     def __init__(
-        self, scene, structures, size, depth, samples, seed, count, check, threshold=0.0, roulette=False,
-        light_samples=1
+        self,
+        scene,
+        structures,
+        size,
+        depth,
+        samples,
+        seed,
+        count,
+        check,
+        threshold=0.0,
+        roulette=False,
+        light_samples=1,
     ):
         self.scene, self.size, self.depth, self.samples, self.seed, self.count = (
             scene,
@@ -140,7 +150,11 @@ class Whitted:
     def pixel(self, x, y, sample):
         """One sample of a pixel; what it returns is named as in :meth:`tile`."""
         random = self.samples > 1
-        key = sampling.first_key(y * self.size[0] + x, sample, self.seed) if random or self.soft or self.roulette else None
+        key = (
+            sampling.first_key(y * self.size[0] + x, sample, self.seed)
+            if random or self.soft or self.roulette
+            else None
+        )
         o, d = primary(self.scene.camera, self.size, x, y, key if random else None)
         return self.traced(o, d, key, not sample)
 
@@ -149,9 +163,7 @@ class Whitted:
         self.spent = dict.fromkeys(("rays_per_pixel", *(("n_it", "n_ts") if self.count else ())), 0)
         camera = self.scene.camera
         radiance, first = (0.0, 0.0, 0.0), None
-        stack = [
-            Path(o, d, float(camera.near), float(camera.far), (1.0, 1.0, 1.0), 0, PRIMARY, key)
-        ]
+        stack = [Path(o, d, float(camera.near), float(camera.far), (1.0, 1.0, 1.0), 0, PRIMARY, key)]
         while stack:
             path = stack.pop()
             hit = self._closest(path.kind, path.o, path.d, path.t_min, path.t_max)
