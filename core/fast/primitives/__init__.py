@@ -18,7 +18,9 @@ A kind is one file with one class. Its objects hold n primitives of the kind as 
 ``support(item, axis)``
     Exact extent (d, D) of primitives along the directions given, shape (n, 3).
 
-and may offer ``outline(item)``, the corners of convex polygons, shape (m, 3, 3), and ``blocks(rays, ray, item, t_far)``, the pairs that hit, where that is cheaper than ``intersect``.
+and may offer ``outline(item)``, the corners of convex polygons, shape (m, 3, 3), ``inscribed_box(item)``, the corners, shape (m, 8, 3), of boxes
+such that what passes through one meets the primitive (NaN where there is none), and ``blocks(rays, ray, item, t_far)``, the pairs that hit,
+where that is cheaper than ``intersect``.
 
 A kind may also offer ``hull(item)``: for some of its primitives k points each, shape (3, k, m), whose convex hull holds the
 primitive; three points are a triangle, and the primitive is all of it. Without it the hull is the box.

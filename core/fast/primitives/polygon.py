@@ -12,10 +12,12 @@ import numpy as np
 
 from ...scene.solids import Corners
 from .solids import EPSILON, dot
-from .triangle import Triangles
+from .triangle import TRIM, Triangles
 
 #: Edges looked at together.
 EDGES = 1 << 18
+#: Heights at which an inscribed box is tried, and places in the widest stretch there.
+HEIGHTS, PLACES = 9, (0.5, 0.25, 0.75)
 #: Polygons of more corners have bands.
 MANY = 12
 
@@ -25,6 +27,34 @@ def triangles(placed):
     corners = Corners.of(placed)
     xyz = np.concatenate([corners.xyz[:, k::3] for k in range(3)])
     return Triangles(xyz, placed.object_of, placed.primitive_of, placed.mirrors())
+
+
+def _widest(line, x, n):
+    """Begins and widths of the widest stretches inside of n polygons, from where level lines cross edges; 0 where they cross none."""
+    order = np.lexsort((x, line))
+    line, x = line[order][::2], x[order]
+    left, width = x[::2], x[1::2] - x[::2]
+    # The widest of each comes first, of equal ones the leftmost.
+    order = np.lexsort((left, -width, line))
+    line, left, width = line[order], left[order], width[order]
+    own, place = np.unique(line, return_index=True)
+    found = np.zeros((2, n))
+    found[:, own] = left[place], width[place]
+    return found
+
+
+def _distance(x, y, x1, y1):
+    """From the origin to segments in the plane, in the metric of the greater component.
+
+    The greater component is least at an end, where one component is zero, or where both are equally large.
+    """
+    e, f = x1 - x, y1 - y
+    best = np.minimum(np.maximum(np.abs(x), np.abs(y)), np.maximum(np.abs(x1), np.abs(y1)))
+    for top, bottom in ((-x, e), (-y, f), (y - x, e - f), (-x - y, e + f)):
+        with np.errstate(all="ignore"):
+            s = np.clip(top / bottom, 0.0, 1.0)
+        best = np.fmin(best, np.maximum(np.abs(x + s * e), np.abs(y + s * f)))
+    return best
 
 
 class Polygons:
@@ -153,6 +183,51 @@ class Polygons:
         first = np.concatenate([[0], np.cumsum(count)[:-1]])
         line = np.repeat(np.arange(len(item)), count)
         return line, np.arange(len(line)) + np.repeat(self.corners.start[item] - first, count), first
+
+    def inscribed_box(self, item):
+        """Corners, shape (m, 8, 3), of flat boxes, each of four twice: large quadrilaterals within. NaN where there is no room.
+
+        Along the plane's two axes it is a rectangle with the proportions of the polygon's box, grown around a point until it
+        meets an edge: the best of those in the widest stretches inside at some heights. A trifle smaller, so that
+        rounding does not put a corner outside: seen at any angle that is not nearly edge-on, what passes through one meets
+        the polygon.
+        """
+        if not len(item):
+            return np.zeros((0, 8, 3))
+        i, (ku, kv) = np.arange(len(item)), self.axes[:, item]
+        kw = (kv + 1) % 3
+        lo, hi = self.lo.T[:, item], self.hi.T[:, item]
+        half = np.stack([0.5 * (hi[k, i] - lo[k, i]) for k in (ku, kv)])
+        usable = (self.corners.normal[:, item] != 0.0).any(axis=0) & (half > 0.0).all(axis=0)
+        size = np.where(half > 0.0, half, 1.0)
+        line, corner, first = self._corners_of(item)
+        following = self.corners.following[corner]
+        x0, y0 = (self.corners.xyz[k[line], corner] for k in (ku, kv))
+        x1, y1 = (self.corners.xyz[k[line], following] for k in (ku, kv))
+        best, at = np.zeros(len(item)), np.zeros((2, len(item)))
+        for step in range(HEIGHTS):
+            y = lo[kv, i] + (step + 0.5) / HEIGHTS * (hi[kv, i] - lo[kv, i])
+            level = y[line]
+            cut = np.flatnonzero((y0 > level) != (y1 > level))
+            left, width = _widest(line[cut], x0[cut] + (level[cut] - y0[cut]) / (y1[cut] - y0[cut]) * (x1[cut] - x0[cut]), len(item))
+            for place in PLACES:
+                x = left + place * width
+                (w, h), x_ = size[:, line], x[line]
+                grown = np.minimum.reduceat(_distance((x0 - x_) / w, (y0 - level) / h, (x1 - x_) / w, (y1 - level) / h), first)
+                better = (grown > best) & (width > 0.0)
+                best[better], at[:, better] = grown[better], np.stack([x, y])[:, better]
+        reach = best * half - TRIM * np.maximum(np.abs(lo), np.abs(hi)).max(axis=0)
+        usable &= (reach > 0.0).all(axis=0)
+        n, anchor = self.corners.normal[:, item], self.corners.anchor[:, item]
+        out = np.full((len(item), 8, 3), np.nan)
+        for k in range(8):
+            u, v = at[0] + (reach[0] if k & 1 else -reach[0]), at[1] + (reach[1] if k >> 1 & 1 else -reach[1])
+            with np.errstate(all="ignore"):
+                w = anchor[kw, i] - (n[ku, i] * (u - anchor[ku, i]) + n[kv, i] * (v - anchor[kv, i])) / n[kw, i]
+            for axis, value in ((ku, u), (kv, v), (kw, w)):
+                out[i, k, axis] = value
+        out[~usable] = np.nan
+        return out
 
     def overlaps(self, item, lo, hi):
         """Bool per pair: whether the polygon touches the box."""

@@ -12,6 +12,8 @@ from ...scene.layout import mirrors, to_world
 
 #: gamma(7): relative error of a point interpolated from three vertices (Pharr et al., PBR 4th ed., 6.8.5).
 GAMMA_7 = 7 * 2.0**-53 / (1 - 7 * 2.0**-53)
+#: How far inscribed boxes stay away from edges, relative to the coordinates (8 for the difference between components and lengths).
+TRIM = 8 * 2.0**-40
 
 
 #: Pairs tested together: columns that stay in the cache.
@@ -167,6 +169,24 @@ class Triangles:
     def outline(self, item):
         """Corners, shape (m, 3, 3)."""
         return self.xyz[:, item].T.reshape(-1, 3, 3)
+
+    def inscribed_box(self, item):
+        """Corners, shape (m, 8, 3), of flat boxes, each of four twice: the largest parallelograms within, half the triangles. NaN where there is no room.
+
+        A trifle smaller, so that rounding does not put a corner outside: seen at any angle that is not nearly edge-on, what
+        passes through one meets the triangle.
+        """
+        xyz = self.xyz[:, item]
+        a, e, f = xyz[0:3], xyz[3:6] - xyz[0:3], xyz[6:9] - xyz[0:3]
+        n = e[1] * f[2] - e[2] * f[1], e[2] * f[0] - e[0] * f[2], e[0] * f[1] - e[1] * f[0]
+        area = np.sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2])
+        # The narrowest height is the area by the longest edge.
+        longest = np.abs([e, f, f - e]).max(axis=(0, 1))
+        trim = TRIM * np.abs(xyz).max(axis=0) * longest
+        room = trim < area
+        reach = 0.25 * (1.0 - trim / np.where(room, area, 1.0))
+        ends = np.where(room, [0.25 - reach, 0.25 + reach], np.nan)
+        return np.stack([a + ends[k & 1] * e + ends[k >> 1 & 1] * f for k in range(8)]).transpose(2, 0, 1)
 
     def overlaps(self, item, lo, hi):
         """Bool per pair: whether the triangle touches the box (Akenine-Moller 2001: 13 separating axes)."""

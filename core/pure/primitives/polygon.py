@@ -9,8 +9,30 @@ import math
 
 from ...scene.solids import Corners
 from . import Primitive
-from .solids import EPSILON, divide, dot
-from .triangle import Triangle
+from .solids import EPSILON, clamp, divide, dot
+from .triangle import TRIM, Triangle
+
+#: Heights at which an inscribed box is tried, and places in the widest stretch there.
+HEIGHTS, PLACES = 9, (0.5, 0.25, 0.75)
+
+
+def widest(crossings):
+    """Begin and width of the widest stretch inside, from where a level line crosses edges, in order."""
+    stretches = [(left, right - left) for left, right in zip(crossings[::2], crossings[1::2])]
+    return max(stretches, key=lambda s: s[1], default=(0.0, 0.0))
+
+
+def distance(p, q):
+    """From the origin to a segment in the plane, in the metric of the greater component.
+
+    The greater component is least at an end, where one component is zero, or where both are equally large.
+    """
+    x, y, e, f = p[0], p[1], q[0] - p[0], q[1] - p[1]
+    best = min(max(abs(x), abs(y)), max(abs(q[0]), abs(q[1])))
+    for top, bottom in ((-x, e), (-y, f), (y - x, e - f), (-x - y, e + f)):
+        s = clamp(divide(top, bottom), 0.0, 1.0)
+        best = min(best, max(abs(x + s * e), abs(y + s * f)))
+    return best
 
 
 class ThreeCorners:
@@ -104,6 +126,42 @@ class Polygon(Primitive):
     def support(self, axis):
         along = [dot(p, axis) for p in self.corners]
         return min(along), max(along)
+
+    def inscribed_box(self):
+        """The 8 corners of a flat box, each of four twice: a large quadrilateral within. None where there is no room.
+
+        Along the plane's two axes it is a rectangle with the proportions of the polygon's box, grown around a point until it
+        meets an edge: the best of those in the widest stretches inside at some heights. A trifle smaller, so that
+        rounding does not put a corner outside: seen at any angle that is not nearly edge-on, what passes through it meets
+        the polygon.
+        """
+        ku, kv, kw = self.axes
+        half = [0.5 * (self.hi[k] - self.lo[k]) for k in (ku, kv)]
+        if not any(self.normal) or min(half) <= 0.0:
+            return None
+        flat = [(p[ku], p[kv]) for p in self.corners]
+        edges = list(zip(flat, flat[1:] + flat[:1]))
+        best, at = 0.0, None
+        for step in range(HEIGHTS):
+            y = self.lo[kv] + (step + 0.5) / HEIGHTS * (self.hi[kv] - self.lo[kv])
+            left, width = widest(sorted(p[0] + (y - p[1]) / (q[1] - p[1]) * (q[0] - p[0]) for p, q in edges if (p[1] > y) != (q[1] > y)))
+            for place in PLACES if width > 0.0 else ():
+                x = left + place * width
+                grown = min(distance(((a[0] - x) / half[0], (a[1] - y) / half[1]), ((b[0] - x) / half[0], (b[1] - y) / half[1])) for a, b in edges)
+                if grown > best:
+                    best, at = grown, (x, y)
+        trim = TRIM * max(map(abs, (*self.lo, *self.hi)))
+        du, dv = best * half[0] - trim, best * half[1] - trim
+        if min(du, dv) <= 0.0:
+            return None
+        n, anchor = self.normal, self.anchor
+        corners = []
+        for k in range(8):
+            p = [0.0] * 3
+            p[ku], p[kv] = at[0] + (du if k & 1 else -du), at[1] + (dv if k >> 1 & 1 else -dv)
+            p[kw] = anchor[kw] - (n[ku] * (p[ku] - anchor[ku]) + n[kv] * (p[kv] - anchor[kv])) / n[kw]
+            corners.append(tuple(p))
+        return corners
 
     def overlaps(self, lo, hi):
         """Whether the polygon touches the box."""

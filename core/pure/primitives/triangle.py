@@ -15,6 +15,8 @@ from . import Primitive
 ROUNDING = 2.0**-53
 #: gamma(7): relative error of a point interpolated from three vertices (Pharr et al., PBR 4th ed., 6.8.5).
 GAMMA_7 = 7 * ROUNDING / (1 - 7 * ROUNDING)
+#: How far inscribed boxes stay away from edges, relative to the coordinates (8 for the difference between components and lengths).
+TRIM = 8 * 2.0**-40
 
 
 def triangles_of(objects, which):
@@ -127,6 +129,25 @@ class Triangle(Primitive):
     def outline(self):
         """The corners, as every kind that is a convex polygon may offer them."""
         return [self.a, self.b, self.c]
+
+    def inscribed_box(self):
+        """The 8 corners of a flat box, each of four twice: the largest parallelogram within, half the triangle. None where there is no room.
+
+        A trifle smaller, so that rounding does not put a corner outside: seen at any angle that is not nearly edge-on, what
+        passes through it meets the triangle.
+        """
+        a = self.a
+        e, f = [y - x for x, y in zip(a, self.b)], [y - x for x, y in zip(a, self.c)]
+        n = (e[1] * f[2] - e[2] * f[1], e[2] * f[0] - e[0] * f[2], e[0] * f[1] - e[1] * f[0])
+        area = math.sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2])
+        # The narrowest height is the area by the longest edge.
+        longest = max(abs(x) for x in (*e, *f, *(y - x for x, y in zip(e, f))))
+        trim = TRIM * max(map(abs, (*self.lo, *self.hi))) * longest
+        if not trim < area:
+            return None
+        reach = 0.25 * (1.0 - trim / area)
+        ends = 0.25 - reach, 0.25 + reach
+        return [tuple(x + ends[k & 1] * y + ends[k >> 1 & 1] * z for x, y, z in zip(a, e, f)) for k in range(8)]
 
     def overlaps(self, lo, hi):
         """Whether the triangle touches the box: 13 separating axes (Akenine-Moller 2001)."""
