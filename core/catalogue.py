@@ -95,7 +95,7 @@ TECHNIQUES = (
               parameters=(
                   Parameter("builder", {"pure": "sah", "fast": "ploc"}, "How the tree is built",
                             choices=("incremental", "sah", "sweep", "median", "lbvh", "ploc")),
-                  Parameter("order", "sorted", "In which order the incremental builder inserts: as in the scene, along a space-filling curve, at random",
+                  Parameter("order", "shuffled", "In which order the incremental builder inserts: as in the scene, along a space-filling curve, at random",
                             choices=("scene", "sorted", "shuffled")),
                   Parameter("seed", 0, "Of the random order", low=0, high=2**31 - 1),
                   Parameter("leaf_size", {"pure": 2, "fast": 1},
