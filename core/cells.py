@@ -9,13 +9,28 @@ REFERENCES_AT_LEAST = 1_000
 #: ... or this many a primitive, whichever is larger: primitives that overlap cannot be told apart by any division.
 REFERENCES_PER_PRIMITIVE = 64
 #: Unit directions of slabs: the axes, the diagonals of a cube, those of its faces.
-DIRECTIONS = tuple(tuple(x / math.sqrt(sum(map(abs, d))) for x in d) for d in (
-    (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0), (1.0, 1.0, 1.0), (1.0, 1.0, -1.0), (1.0, -1.0, 1.0), (-1.0, 1.0, 1.0),
-    (1.0, 1.0, 0.0), (1.0, -1.0, 0.0), (1.0, 0.0, 1.0), (1.0, 0.0, -1.0), (0.0, 1.0, 1.0), (0.0, 1.0, -1.0)))
+DIRECTIONS = tuple(
+    tuple(x / math.sqrt(sum(map(abs, d))) for x in d)
+    for d in (
+        (1.0, 0.0, 0.0),
+        (0.0, 1.0, 0.0),
+        (0.0, 0.0, 1.0),
+        (1.0, 1.0, 1.0),
+        (1.0, 1.0, -1.0),
+        (1.0, -1.0, 1.0),
+        (-1.0, 1.0, 1.0),
+        (1.0, 1.0, 0.0),
+        (1.0, -1.0, 0.0),
+        (1.0, 0.0, 1.0),
+        (1.0, 0.0, -1.0),
+        (0.0, 1.0, 1.0),
+        (0.0, 1.0, -1.0),
+    )
+)
 #: Positions along a cell that the sweep of a kd-tree tells apart.
 POSITIONS = 2**32
-#: Part of a cell's edge (of a grid), or of the root's longest edge (of a tree), by which cells overlap, so that a walk off
-#: by rounding errors meets every primitive all the same.
+#: Part of a cell's edge (of a grid), or of the root's longest edge (of a tree), by which cells overlap, so that a
+#: walk off by rounding errors meets every primitive all the same.
 GRID_OVERLAP, TREE_OVERLAP = 2.0**-20, 2.0**-30
 
 
@@ -63,28 +78,40 @@ def too_many(name, cells, most, size, n, rule, density):
     fits = max(cells)
     while fits > 1 and math.prod(cells_along(size, n, rule, density, fits)) > most:
         fits = fits * 15 // 16
-    return (f"{name}: {' x '.join(map(str, cells))} cells are more than the {most} that fit into memory. "
-            f"Set resolution to {fits} or less.")
+    return (
+        f"{name}: {' x '.join(map(str, cells))} cells are more than the {most} that fit into memory. "
+        f"Set resolution to {fits} or less."
+    )
 
 
 def too_many_slabs(need, slabs):
     """The message that lists of slabs would not fit."""
-    return (f"separated-grid: lists of {' + '.join(map(str, slabs))} slabs would take {need / 2**30:.1f} GiB, more than half of the free "
-            f"memory. Set intersect to sorted, or resolution to {max(slabs) // 2} or less.")
+    return (
+        f"separated-grid: lists of {' + '.join(map(str, slabs))} slabs would take {need / 2**30:.1f} GiB, more than half of the free "
+        f"memory. Set intersect to sorted, or resolution to {max(slabs) // 2} or less."
+    )
 
 
 def bsp_notice(references, n):
     """What is said when a BSP tree degenerates."""
-    return Notice("bsp-tree", f"degenerates: {references} references to {n} primitives, because most planes cut many of them. "
-                  f"Use planes = slabs, a smaller max_depth, or a kd-tree.")
+    return Notice(
+        "bsp-tree",
+        f"degenerates: {references} references to {n} primitives, because most planes cut many of them. "
+        f"Use planes = slabs, a smaller max_depth, or a kd-tree.",
+    )
 
 
 def limit_notice(name, limit, lo, hi, level, count):
     """What is said when division stopped because there were too many references."""
+
     def text(point):
         return "(" + ", ".join(f"{x:.4g}" for x in point) + ")"
-    return Notice(name, f"division stopped at {limit} references to primitives, at the cell {text(lo)} .. {text(hi)} on level {level} "
-                  f"with {count} primitives. Primitives that overlap cannot be separated; use a smaller max_depth or a larger leaf_size.")
+
+    return Notice(
+        name,
+        f"division stopped at {limit} references to primitives, at the cell {text(lo)} .. {text(hi)} on level {level} "
+        f"with {count} primitives. Primitives that overlap cannot be separated; use a smaller max_depth or a larger leaf_size.",
+    )
 
 
 def table_size(n):
@@ -96,8 +123,10 @@ def table_size(n):
 def check_storage(storage, walk, split):
     """Raise a ParameterError where leaves without pointers (linear, hashed) are asked for more than they can do."""
     if storage != "pointers" and (walk != "root" or split != "centre"):
-        raise ParameterError(f"octree: storage = {storage} keeps no pointers and no planes, so it goes with walk = root and split = centre "
-                             f"only, not with walk = {walk}, split = {split}.")
+        raise ParameterError(
+            f"octree: storage = {storage} keeps no pointers and no planes, so it goes with walk = root and split = centre "
+            f"only, not with walk = {walk}, split = {split}."
+        )
 
 
 def depth_for(n):

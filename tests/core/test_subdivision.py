@@ -21,7 +21,9 @@ def soup(n, size, seed=1, scale=1.0, offset=0.0):
 
 def mixed():
     rng = np.random.default_rng(2)
-    shapes = Shapes([solids.sphere(rng.random(3), 0.1) for _ in range(15)] + [solids.box(p, p + 0.2) for p in rng.random((5, 3))])
+    shapes = Shapes(
+        [solids.sphere(rng.random(3), 0.1) for _ in range(15)] + [solids.box(p, p + 0.2) for p in rng.random((5, 3))]
+    )
     return Scene([*soup(60, 0.2).objects, Object("shapes", shapes)])
 
 
@@ -30,7 +32,7 @@ def rays(n=250, seed=3):
     o, d = 2.0 * rng.random((n, 3)) - 0.5, rng.normal(size=(n, 3))
     d[:20, 0] = 0.0
     d[20:40] = np.eye(3)[rng.integers(3, size=20)] * np.where(rng.random((20, 1)) < 0.5, -1.0, 1.0)
-    o[40:80] = np.round(4.0 * o[40:80]) / 4.0           # on planes, edges and corners
+    o[40:80] = np.round(4.0 * o[40:80]) / 4.0  # on planes, edges and corners
     d[40:80] = np.round(2.0 * d[40:80]) + (0.0, 0.0, 1e-3)
     return o, d
 
@@ -43,19 +45,30 @@ def counts(index, o, d, **more):
 WALKS = ("root", "intervals", "links", "heap")
 #: Combinations of parameters that test_properties does not try, since it changes one at a time.
 COMBINATIONS = [
-    ("grid", dict(walk="subtract", lists="shared", mailbox=False)), ("grid", dict(walk="add", rule="regular", density=20.0)),
+    ("grid", dict(walk="subtract", lists="shared", mailbox=False)),
+    ("grid", dict(walk="add", rule="regular", density=20.0)),
     ("grid", dict(rule="heterogeneous", resolution=9)),
-    ("separated-grid", dict(axes=2, intersect="sorted", mailbox=False)), ("separated-grid", dict(axes=2, density=10.0)),
-    ("macro-grid", dict(region="cube", resolution=15)), ("macro-grid", dict(region="box", resolution=15, lists="shared")),
+    ("separated-grid", dict(axes=2, intersect="sorted", mailbox=False)),
+    ("separated-grid", dict(axes=2, density=10.0)),
+    ("macro-grid", dict(region="cube", resolution=15)),
+    ("macro-grid", dict(region="box", resolution=15, lists="shared")),
     *(("octree", dict(walk=w, split="cost", leaf_size=2, lists="shared")) for w in WALKS),
-    *(("octree", dict(storage=s, leaf_size=1, max_depth=5, mailbox=False, lists=shared)) for s, shared in (("linear", "own"), ("hashed", "shared"))),
+    *(
+        ("octree", dict(storage=s, leaf_size=1, max_depth=5, mailbox=False, lists=shared))
+        for s, shared in (("linear", "own"), ("hashed", "shared"))
+    ),
     *(("kd-tree", dict(walk=w, split="middle", stop="depth", max_depth=9, mailbox=False)) for w in WALKS),
     *(("kd-tree", dict(walk=w, clip=False, lists="shared")) for w in WALKS),
-    ("bsp-tree", dict(planes="slabs", directions=13, stop="cost", mailbox=False)), ("bsp-tree", dict(leaf_size=1, lists="shared")),
+    ("bsp-tree", dict(planes="slabs", directions=13, stop="cost", mailbox=False)),
+    ("bsp-tree", dict(leaf_size=1, lists="shared")),
 ]
 
 
-@pytest.mark.parametrize("name, parameters", COMBINATIONS, ids=lambda x: x if isinstance(x, str) else "-".join(f"{k}={v}" for k, v in x.items()))
+@pytest.mark.parametrize(
+    "name, parameters",
+    COMBINATIONS,
+    ids=lambda x: x if isinstance(x, str) else "-".join(f"{k}={v}" for k, v in x.items()),
+)
 @pytest.mark.parametrize("scene", [soup(90, 0.1), mixed()], ids=["soup", "mixed"])
 def test_both_cores_do_the_same(scene, name, parameters):
     """The same hits, the same cells, the same counts for every single ray."""
@@ -93,12 +106,15 @@ def test_storages_are_the_same_tree(storage):
     a, b = counts(pointers, o, d)[0], counts(other, o, d)[0]
     assert np.array_equal(a[[0, 2, 3]], b[[0, 2, 3]])
     assert np.array_equal(a[1], b[1]) if storage == "hashed" else (b[1] == b[2]).all()
-    mine, theirs = (np.sort(np.concatenate([c.lo, c.hi], axis=1)[c.leaf], axis=0) for c in (pointers.cells(), other.cells()))
+    mine, theirs = (
+        np.sort(np.concatenate([c.lo, c.hi], axis=1)[c.leaf], axis=0) for c in (pointers.cells(), other.cells())
+    )
     assert np.array_equal(mine, theirs)
     assert other.figures["memory"] < pointers.figures["memory"]
     if storage == "hashed":
         assert 0.5 < other.figures["load_factor"] < 1.0
-        # A third of the entries collides at three quarters full, if names are spread well: n - size (1 - (1 - 1/size)^n).
+        # A third of the entries collides at three quarters full, if names are spread well: n - size (1 - (1 -
+        # 1/size)^n).
         n, size = other.figures["N_E"], other.figures["N_E"] / other.figures["load_factor"]
         assert other.figures["collisions"] < 1.5 * (n - size * (1.0 - math.exp(-n / size)))
 
@@ -128,7 +144,10 @@ def test_memory_given_is_kept(name, core):
 def test_memory_goes_where_rays_test_most(name):
     """More memory, fewer tests; and the queue is better than stopping at a level with as many cells."""
     scene, (o, d) = soup(600, 0.03), rays(1000)
-    tests = [counts(build(scene, name, stop="memory", max_bytes=b, leaf_size=1, mailbox=False), o, d)[0][0].sum() for b in (1e4, 4e4, 1.6e5)]
+    tests = [
+        counts(build(scene, name, stop="memory", max_bytes=b, leaf_size=1, mailbox=False), o, d)[0][0].sum()
+        for b in (1e4, 4e4, 1.6e5)
+    ]
     assert tests[0] > 1.5 * tests[1] > 2.0 * tests[2]
 
 
@@ -193,12 +212,13 @@ def test_shared_lists_are_walked_once():
 def test_lists_that_only_look_alike_are_not_shared(monkeypatch):
     """Even if all sums of hashes collide."""
     import rayscope.core.fast.subdivision.lists as module
+
     monkeypatch.setattr(module, "scrambled", lambda keys: keys & np.uint64(0))
     lists = Lists(np.array([0, 0, 1, 1, 3, 3]), np.array([1, 2, 1, 3, 1, 2]), 4, shared=True)
     got = []
     for cell in range(4):
         _, first, count = lists.of(np.array([cell]))
-        got.append(lists.items[first[0]:first[0] + count[0]].tolist())
+        got.append(lists.items[first[0] : first[0] + count[0]].tolist())
     assert got == [[1, 2], [1, 3], [], [1, 2]]
     assert lists.list_of[0] == lists.list_of[3] != lists.list_of[1] and lists.list_of[2] == 0
 
@@ -216,13 +236,19 @@ def test_pair_set():
 
 def test_macro_regions_save_steps_and_cost_memory():
     scene, (o, d) = soup(40, 0.02), rays()
-    plain, cube, box = (build(scene, "grid", resolution=40), build(scene, "macro-grid", resolution=40),
-                        build(scene, "macro-grid", resolution=40, region="box"))
+    plain, cube, box = (
+        build(scene, "grid", resolution=40),
+        build(scene, "macro-grid", resolution=40),
+        build(scene, "macro-grid", resolution=40, region="box"),
+    )
     a, b, c = (counts(x, o, d)[0].sum(axis=1) for x in (plain, cube, box))
     assert a[0] == b[0] == c[0]
     assert c[1] < b[1] < 0.5 * a[1]
     cells = plain.figures["N_E"]
-    assert cube.figures["memory"] == plain.figures["memory"] + cells and box.figures["memory"] == plain.figures["memory"] + 6 * cells
+    assert (
+        cube.figures["memory"] == plain.figures["memory"] + cells
+        and box.figures["memory"] == plain.figures["memory"] + 6 * cells
+    )
 
 
 def test_macro_regions_are_chessboard_distances():
@@ -244,17 +270,29 @@ def test_separated_lists_lose_nothing_and_test_more(axes):
         first, listed, exactly = np.cumsum(length) - length, 0, 0
         for cell in cells:
             _, begin, count = exact.lists.of(np.array([cell]))
-            mine = set(items[first[cell]:first[cell] + length[cell]].tolist())
+            mine = set(items[first[cell] : first[cell] + length[cell]].tolist())
             listed, exactly = listed + length[cell], exactly + count[0]
-            assert mine >= set(exact.lists.items[begin[0]:begin[0] + count[0]].tolist())
+            assert mine >= set(exact.lists.items[begin[0] : begin[0] + count[0]].tolist())
         assert index.figures["surplus"] == pytest.approx(listed / exactly - 1.0)
-        assert build(scene, "separated-grid", core="pure", resolution=8).figures["surplus"] == pytest.approx(index.figures["surplus"])
+        assert build(scene, "separated-grid", core="pure", resolution=8).figures["surplus"] == pytest.approx(
+            index.figures["surplus"]
+        )
     assert counts(index, o, d)[0][0].sum() > counts(exact, o, d)[0][0].sum()
 
 
 @pytest.mark.parametrize("scale", [1e-6, 1.0, 1e6])
-@pytest.mark.parametrize("name, parameters", [("grid", {}), ("macro-grid", {}), ("octree", dict(storage="hashed", leaf_size=1)), ("octree", dict(walk="links", leaf_size=1)),
-                                              ("kd-tree", {}), ("bsp-tree", {})], ids=str)
+@pytest.mark.parametrize(
+    "name, parameters",
+    [
+        ("grid", {}),
+        ("macro-grid", {}),
+        ("octree", dict(storage="hashed", leaf_size=1)),
+        ("octree", dict(walk="links", leaf_size=1)),
+        ("kd-tree", {}),
+        ("bsp-tree", {}),
+    ],
+    ids=str,
+)
 def test_through_edges_and_corners_of_cells(name, parameters, scale):
     """Rays along the diagonals of a lattice of small triangles, whose points are corners of cells."""
     k = np.stack(np.meshgrid(*[np.arange(5.0)] * 3, indexing="ij"), axis=-1).reshape(-1, 1, 3)
@@ -281,7 +319,9 @@ def test_rays_from_very_far_away_are_traced_by_brute_force(name, core):
 
 def test_surface_area_heuristic_and_clipping_pay():
     scene = soup(1000, 0.05)
-    middle, sah = (build(scene, "kd-tree", **more).figures["c_SAH"] for more in (dict(split="middle", stop="depth"), {}))
+    middle, sah = (
+        build(scene, "kd-tree", **more).figures["c_SAH"] for more in (dict(split="middle", stop="depth"), {})
+    )
     assert sah < 0.9 * middle, (sah, middle)
     loose = build(scene, "kd-tree", clip=False).figures["c_SAH"]
     assert sah < 0.9 * loose, (sah, loose)

@@ -1,8 +1,8 @@
 """Published measurements of grids and octrees on the Standard Procedural Databases, and the rays to repeat them with.
 
-V. Havran and F. Sixta, Comparison of Hierarchical Grids, and V. Havran, A Summary of Octree Ray Traversal Algorithms, Ray
-Tracing News 12(1) and 12(2), 1999. Rays: 513 x 513 through the corners of pixels, their shadow rays, reflections and
-refractions, as in test_spd_invariants. No mailboxes. N_IT and N_TS are means over all rays.
+V. Havran and F. Sixta, Comparison of Hierarchical Grids, and V. Havran, A Summary of Octree Ray Traversal Algorithms,
+Ray Tracing News 12(1) and 12(2), 1999. Rays: 513 x 513 through the corners of pixels, their shadow rays, reflections
+and refractions, as in test_spd_invariants. No mailboxes. N_IT and N_TS are means over all rays.
 """
 
 import numpy as np
@@ -13,26 +13,50 @@ SCENES = ("balls", "gears", "lattice", "mount", "rings", "teapot", "tetra", "tre
 
 #: Uniform grid, density 1 and 10: resolution, N_EV, N_OIV, N_IT, N_TS. N_V is the product of the resolution.
 GRID = {
-    1: {"balls": ((46, 46, 3), 4208, 10240, 358.66, 5.69), "gears": ((32, 33, 9), 6080, 39344, 39.76, 6.84),
-        "lattice": ((20, 20, 20), 0, 32152, 20.67, 5.09), "mount": ((20, 20, 20), 6502, 21746, 19.01, 8.85),
-        "rings": ((21, 20, 21), 6264, 27666, 45.29, 11.78), "teapot": ((28, 29, 11), 7226, 22982, 33.65, 14.98),
-        "tetra": ((16, 16, 16), 3104, 12556, 20.64, 7.43), "tree": ((52, 52, 3), 5400, 11102, 727.62, 7.60)},
-    10: {"balls": ((103, 103, 7), 63393, 19966, 72.54, 12.40), "gears": ((71, 71, 18), 66531, 110029, 22.82, 13.83),
-         "lattice": ((44, 44, 44), 38016, 90368, 9.26, 10.56), "mount": ((44, 44, 42), 71924, 51144, 13.17, 18.43),
-         "rings": ((44, 43, 44), 66753, 71303, 23.36, 24.51), "teapot": ((61, 61, 25), 83721, 52781, 15.13, 32.50),
-         "tetra": ((35, 35, 35), 37311, 35936, 10.01, 15.97), "tree": ((117, 118, 5), 55191, 22407, 246.08, 15.45)},
+    1: {
+        "balls": ((46, 46, 3), 4208, 10240, 358.66, 5.69),
+        "gears": ((32, 33, 9), 6080, 39344, 39.76, 6.84),
+        "lattice": ((20, 20, 20), 0, 32152, 20.67, 5.09),
+        "mount": ((20, 20, 20), 6502, 21746, 19.01, 8.85),
+        "rings": ((21, 20, 21), 6264, 27666, 45.29, 11.78),
+        "teapot": ((28, 29, 11), 7226, 22982, 33.65, 14.98),
+        "tetra": ((16, 16, 16), 3104, 12556, 20.64, 7.43),
+        "tree": ((52, 52, 3), 5400, 11102, 727.62, 7.60),
+    },
+    10: {
+        "balls": ((103, 103, 7), 63393, 19966, 72.54, 12.40),
+        "gears": ((71, 71, 18), 66531, 110029, 22.82, 13.83),
+        "lattice": ((44, 44, 44), 38016, 90368, 9.26, 10.56),
+        "mount": ((44, 44, 42), 71924, 51144, 13.17, 18.43),
+        "rings": ((44, 43, 44), 66753, 71303, 23.36, 24.51),
+        "teapot": ((61, 61, 25), 83721, 52781, 15.13, 32.50),
+        "tetra": ((35, 35, 35), 37311, 35936, 10.01, 15.97),
+        "tree": ((117, 118, 5), 55191, 22407, 246.08, 15.45),
+    },
 }
 
 #: Octrees of four levels: N_IN, N_EV, N_OIV, then N_IT and N_TS of O84 (point location) and of O93 (depth first).
 OCTREE = {
-    "centre": {"balls": (57, 300, 9171, 1787.0, 48.53, 1794.0, 20.58), "gears": (265, 652, 39440, 157.5, 27.46, 150.1, 12.86),
-               "lattice": (585, 0, 22112, 28.6, 22.03, 26.94, 10.13), "mount": (232, 777, 18107, 42.53, 22.43, 41.97, 10.80),
-               "rings": (231, 416, 22505, 107.8, 32.34, 108.0, 14.66), "teapot": (227, 777, 18845, 184.0, 33.66, 182.7, 14.79),
-               "tetra": (305, 1072, 13312, 120.0, 21.54, 117.2, 9.59), "tree": (53, 278, 9029, 8066.0, 63.48, 8057.0, 26.62)},
-    "cost": {"balls": (131, 214, 10160, 81.2, 27.73, 84.31, 12.95), "gears": (349, 580, 31144, 68.78, 23.5, 65.44, 11.70),
-             "lattice": (585, 0, 18768, 24.0, 22.33, 23.05, 10.27), "mount": (312, 866, 21489, 31.38, 22.61, 30.89, 10.71),
-             "rings": (347, 406, 20867, 58.0, 30.24, 57.85, 13.98), "teapot": (330, 853, 25332, 106.3, 35.82, 103.2, 15.42),
-             "tetra": (325, 1116, 13792, 99.56, 21.15, 97.06, 9.59), "tree": (71, 231, 9489, 236.4, 31.83, 235.2, 14.83)},
+    "centre": {
+        "balls": (57, 300, 9171, 1787.0, 48.53, 1794.0, 20.58),
+        "gears": (265, 652, 39440, 157.5, 27.46, 150.1, 12.86),
+        "lattice": (585, 0, 22112, 28.6, 22.03, 26.94, 10.13),
+        "mount": (232, 777, 18107, 42.53, 22.43, 41.97, 10.80),
+        "rings": (231, 416, 22505, 107.8, 32.34, 108.0, 14.66),
+        "teapot": (227, 777, 18845, 184.0, 33.66, 182.7, 14.79),
+        "tetra": (305, 1072, 13312, 120.0, 21.54, 117.2, 9.59),
+        "tree": (53, 278, 9029, 8066.0, 63.48, 8057.0, 26.62),
+    },
+    "cost": {
+        "balls": (131, 214, 10160, 81.2, 27.73, 84.31, 12.95),
+        "gears": (349, 580, 31144, 68.78, 23.5, 65.44, 11.70),
+        "lattice": (585, 0, 18768, 24.0, 22.33, 23.05, 10.27),
+        "mount": (312, 866, 21489, 31.38, 22.61, 30.89, 10.71),
+        "rings": (347, 406, 20867, 58.0, 30.24, 57.85, 13.98),
+        "teapot": (330, 853, 25332, 106.3, 35.82, 103.2, 15.42),
+        "tetra": (325, 1116, 13792, 99.56, 21.15, 97.06, 9.59),
+        "tree": (71, 231, 9489, 236.4, 31.83, 235.2, 14.83),
+    },
 }
 
 BOUNCES = 4
@@ -49,9 +73,11 @@ def rays_of(scene, step=4):
         `any` says that any hit will do.
     """
     index = build(scene, "bvh")
-    obj, = scene.objects
+    (obj,) = scene.objects
     slot = np.array([s.slot for s in obj.geometry.solids])
-    mirror, glass, ior = (np.array([getattr(m, name) for m in obj.materials]) for name in ("mirror", "transmission", "ior"))
+    mirror, glass, ior = (
+        np.array([getattr(m, name) for m in obj.materials]) for name in ("mirror", "transmission", "ior")
+    )
     y, x = np.mgrid[0:513:step, 0:513:step]
     o, d = scene.camera.rays(x.ravel(), y.ravel(), (512, 512))
     rays = []

@@ -1,8 +1,9 @@
 """General BSP tree: planes of any orientation, from the polygons themselves or from fixed directions.
 
-Fuchs, Kedem and Naylor (1980); front to back along a ray. A division has three parts: what lies below the plane, what lies
-in it, and what lies above it. Polygons that straddle a plane are cut into fragments, and a fragment is in its own part
-only; other primitives are in both parts. A ray near a plane looks into both, so nothing depends on the rounding of a cut.
+Fuchs, Kedem and Naylor (1980); front to back along a ray. A division has three parts: what lies below the plane, what
+lies in it, and what lies above it. Polygons that straddle a plane are cut into fragments, and a fragment is in its
+own part only; other primitives are in both parts. A ray near a plane looks into both, so nothing depends on the
+rounding of a cut.
 """
 
 import numpy as np
@@ -25,14 +26,14 @@ TOLERANCE = 0.25
 class BspTree(CellTree):
     """The tree; a cell's children are the part below its plane, the part in it, and the part above it.
 
-    Cells are convex polytopes; the boxes kept are boxes around them. ``tree.plane`` holds normal x, y, z and distance of
-    each cell's plane.
+    Cells are convex polytopes; the boxes kept are boxes around them. ``tree.plane`` holds normal x, y, z and distance
+    of each cell's plane.
     """
 
     ARITY, NAME, MORE_BYTES = 3, "bsp-tree", 8
 
     def build(self, progress, planes, directions, stop, max_depth, leaf_size, max_bytes, mailbox, lists):
-        self.planes, self.directions = planes, np.array(DIRECTIONS[:directions if planes == "slabs" else 3])
+        self.planes, self.directions = planes, np.array(DIRECTIONS[: directions if planes == "slabs" else 3])
         self.lay_out()
         p, n = self.primitives, self.primitives.n
         corners, number = np.zeros((n, CORNERS, 3)), np.zeros(n, np.int64)
@@ -84,7 +85,11 @@ class BspTree(CellTree):
         count = np.bincount(child, minlength=3 * m)
         area = box_area(cells.lo, cells.hi)
         cost = 1.0 + (box_area(lo, hi) * count).reshape(-1, 3).sum(axis=1) / np.where(area > 0.0, area, 1.0)
-        return plane, Cells(lo, hi, count, cells.item[ref], (np.concatenate(corners)[order], np.concatenate(numbers)[order])), cost
+        return (
+            plane,
+            Cells(lo, hi, count, cells.item[ref], (np.concatenate(corners)[order], np.concatenate(numbers)[order])),
+            cost,
+        )
 
     def _candidates(self, cells, cell):
         """Planes to try, one a cell: (normal (3, m), distance (m,))."""
@@ -186,7 +191,11 @@ class BspTree(CellTree):
                 until, since = np.where(np.isnan(until), np.inf, until), np.where(np.isnan(since), -np.inf, since)
                 until, since = np.minimum(until, end), np.maximum(since, begin)
                 child = tree.child.take(cell)
-                for part, low, high in ((np.where(down, 0, 2), since, end), (1, since, until), (np.where(down, 2, 0), begin, until)):
+                for part, low, high in (
+                    (np.where(down, 0, 2), since, end),
+                    (1, since, until),
+                    (np.where(down, 2, 0), begin, until),
+                ):
                     some = np.flatnonzero(low <= high)
                     mine = s.take(some)
                     top[mine] += 1
@@ -197,7 +206,7 @@ class BspTree(CellTree):
 
     def walk(self, rays, ray, t_in, t_out, visits, query):
         for start in range(0, len(ray), RAYS):
-            some = ray[start:start + RAYS]
+            some = ray[start : start + RAYS]
             self.visit_all(rays, some, t_in[some], t_out[some], visits, query)
 
 

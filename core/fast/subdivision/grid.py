@@ -58,8 +58,11 @@ class Grid(Structure):
             self.resolution[np.argmin(self.resolution)] = 1
         self._refuse_too_many(size, rule, density)
         edges = ((hi - lo) / self.resolution)[self.resolution > 1]
-        self.margin = max(GRID_OVERLAP * float(edges.min(initial=np.inf)) if len(edges) else 0.0,
-                          64.0 * EPSILON * float(np.abs([lo, hi]).max()), 1e-300)
+        self.margin = max(
+            GRID_OVERLAP * float(edges.min(initial=np.inf)) if len(edges) else 0.0,
+            64.0 * EPSILON * float(np.abs([lo, hi]).max()),
+            1e-300,
+        )
         self.lo, self.hi = lo - self.margin, hi + self.margin
         self.width = (self.hi - self.lo) / self.resolution
         self.stride = np.array([self.resolution[1] * self.resolution[2], self.resolution[2], 1])
@@ -69,7 +72,9 @@ class Grid(Structure):
         most = int(min(0.5 * free_memory() / CELL_BYTES, 2**31 - 1))
         cells = math.prod(self.resolution.tolist())
         if cells > most:
-            raise MemoryEstimateError(too_many(self.NAME, self.resolution.tolist(), most, size, self.primitives.n, rule, density))
+            raise MemoryEstimateError(
+                too_many(self.NAME, self.resolution.tolist(), most, size, self.primitives.n, rule, density)
+            )
 
     def _entries(self, progress):
         """Pairs (cell, item): which primitives reach into which cells."""
@@ -96,24 +101,29 @@ class Grid(Structure):
                 items.append(item)
                 total += len(cell)
             if total > limit:
-                raise MemoryEstimateError(f"{self.NAME}: {' x '.join(map(str, self.resolution))} cells would hold more than {int(limit)} references to "
-                                          f"primitives, which is what fits. Set resolution to {int(self.resolution.max()) // 2} or less.")
+                raise MemoryEstimateError(
+                    f"{self.NAME}: {' x '.join(map(str, self.resolution))} cells would hold more than {int(limit)} references to "
+                    f"primitives, which is what fits. Set resolution to {int(self.resolution.max()) // 2} or less."
+                )
             begin = end
             progress(begin / p.n)
         return np.concatenate(cells), np.concatenate(items)
 
     def _reached(self, some, first, extent, count, piece, sure):
-        """The cells that some primitives reach into; of a single one, only PAIRS cells from number `piece` on are looked at."""
+        """The cells that some primitives reach into; of a single one, only PAIRS cells from number `piece` on are
+        looked at."""
         item = np.repeat(some, count[some])
         place = ranges(np.zeros(len(some), np.int64), count[some])
         if len(some) == 1:
-            item, place = item[piece:piece + PAIRS], place[piece:piece + PAIRS]
+            item, place = item[piece : piece + PAIRS], place[piece : piece + PAIRS]
         ey, ez = extent[item, 1], extent[item, 2]
         x, rest = np.divmod(place, ey * ez)
         y, z = np.divmod(rest, ez)
         index = first[item] + np.stack([x, y, z], axis=1)
         if not sure:
-            inside = self.primitives.overlaps(item, self._plane(index) - self.margin, self._plane(index + 1) + self.margin)
+            inside = self.primitives.overlaps(
+                item, self._plane(index) - self.margin, self._plane(index + 1) + self.margin
+            )
             index, item = index[inside], item[inside]
         return index @ self.stride, item
 
@@ -135,8 +145,14 @@ class Grid(Structure):
         references = int(lists.count.sum())
         area = box_area(np.array([self.lo, np.zeros(3)]), np.array([self.hi, self.width]))
         self.figures.update(
-            N_G=0, N_E=len(lists.count), N_EE=int((lists.count == 0).sum()), N_ER=references, depth=1,
-            c_SAH=float(area[1] * references / area[0]) if area[0] > 0.0 else 0.0, memory=lists.nbytes)
+            N_G=0,
+            N_E=len(lists.count),
+            N_EE=int((lists.count == 0).sum()),
+            N_ER=references,
+            depth=1,
+            c_SAH=float(area[1] * references / area[0]) if area[0] > 0.0 else 0.0,
+            memory=lists.nbytes,
+        )
         if lists.list_of is not None:
             self.figures["N_L"] = lists.lists
 
@@ -173,9 +189,14 @@ class Grid(Structure):
             return super().cells()
         n = len(self.lists.count)
         index = self._indices(np.arange(n)).T
-        return Cells.make(np.concatenate([[self.lo], self._plane(index)]), np.concatenate([[self.hi], self._plane(index + 1)]),
-                          np.concatenate([[0], np.ones(n)]), np.concatenate([[self.figures["N_ER"]], self.lists.count]),
-                          np.concatenate([[False], np.ones(n, bool)]), np.concatenate([[-1], np.zeros(n)]))
+        return Cells.make(
+            np.concatenate([[self.lo], self._plane(index)]),
+            np.concatenate([[self.hi], self._plane(index + 1)]),
+            np.concatenate([[0], np.ones(n)]),
+            np.concatenate([[self.figures["N_ER"]], self.lists.count]),
+            np.concatenate([[False], np.ones(n, bool)]),
+            np.concatenate([[-1], np.zeros(n)]),
+        )
 
 
 class Walk:
@@ -270,7 +291,9 @@ class Walk:
         for axis in range(3):
             place = places[axis]
             plane = grid.lo[axis] + (edge[axis] + up[axis]) * grid.width[axis]
-            crossing[axis] = np.where(self.moves.take(place), (plane - self.seen_from.take(place)) * self.inverse.take(place), np.inf)
+            crossing[axis] = np.where(
+                self.moves.take(place), (plane - self.seen_from.take(place)) * self.inverse.take(place), np.inf
+            )
         axis = crossing.argmin(axis=0)
         t_out = crossing.min(axis=0)
         # Along the other axes: the cell of the point, neither behind this one nor beyond the region.

@@ -48,7 +48,14 @@ class Cells:
             return self
         first = np.cumsum(self.count) - self.count
         refs = ranges(first[index], self.count[index])
-        return Cells(self.lo[index], self.hi[index], self.count[index], self.item[refs], tuple(a[refs] for a in self.more), self.level[index])
+        return Cells(
+            self.lo[index],
+            self.hi[index],
+            self.count[index],
+            self.item[refs],
+            tuple(a[refs] for a in self.more),
+            self.level[index],
+        )
 
     @property
     def cell(self):
@@ -86,22 +93,28 @@ class Tree:
     def add(self, cells, level, parent):
         """Add cells; their numbers."""
         m = len(cells.count)
-        for column, values in ((self.lo, cells.lo), (self.hi, cells.hi), (self.level, np.broadcast_to(level, m)),
-                               (self.parent, np.broadcast_to(parent, m))):
+        for column, values in (
+            (self.lo, cells.lo),
+            (self.hi, cells.hi),
+            (self.level, np.broadcast_to(level, m)),
+            (self.parent, np.broadcast_to(parent, m)),
+        ):
             column.append(values)
         self.n += m
         return np.arange(self.n - m, self.n)
 
 
-def grow(divide, root, arity, n, stop, max_depth, leaf_size, max_bytes, node_bytes, reference_bytes, progress, name, notices):
+def grow(
+    divide, root, arity, n, stop, max_depth, leaf_size, max_bytes, node_bytes, reference_bytes, progress, name, notices
+):
     """Grow a tree.
 
     Parameters
     ----------
     divide : callable
         (cells, worth) -> (plane (3, m), children: Cells, cost (m,)): each cell's `arity` children stand one after the
-        other, and `cost` is the expected cost of a ray in the divided cell, in tests. The plane of a cell that cannot be
-        divided is inf along all axes; so may be that of one that need not be, since ``worth(cost)`` is false for it.
+        other, and `cost` is the expected cost of a ray in the divided cell, in tests. The plane of a cell that cannot
+        be divided is inf along all axes; so may be that of one that need not be, since ``worth(cost)`` is false for it.
     root : Cells
     n : int
         Primitives.
@@ -125,7 +138,13 @@ def grow(divide, root, arity, n, stop, max_depth, leaf_size, max_bytes, node_byt
 class _Growth:
     def __init__(self, divide, arity, n, max_depth, leaf_size, progress, name, notices):
         self.divide, self.arity, self.n = divide, arity, n
-        self.max_depth, self.leaf_size, self.progress, self.name, self.notices = max_depth, leaf_size, progress, name, notices
+        self.max_depth, self.leaf_size, self.progress, self.name, self.notices = (
+            max_depth,
+            leaf_size,
+            progress,
+            name,
+            notices,
+        )
         self.limit = max(REFERENCES_AT_LEAST, REFERENCES_PER_PRIMITIVE * n)
         self.tree, self.divided, self.leaves = Tree(), [], []
 
@@ -159,7 +178,7 @@ class _Growth:
             children = children.take((kept[:, None] * self.arity + np.arange(self.arity)).ravel())
             parent = number[wanted[kept]]
             number = self.tree.add(children, level + 1, np.repeat(parent, self.arity))
-            self.divided.append((parent, number[::self.arity], plane[:, kept]))
+            self.divided.append((parent, number[:: self.arity], plane[:, kept]))
             cells, bad, level = children, np.repeat(misses[kept], self.arity), level + 1
             self.progress(level / (self.max_depth + 1))
 
@@ -205,7 +224,7 @@ class _Growth:
                 plane, children, _ = self.divide(together, None)
                 children.level = np.repeat(together.level + 1, self.arity)
                 for k, c in enumerate(batch):
-                    ready[c] = plane[:, k:k + 1], children.take(np.arange(k * self.arity, (k + 1) * self.arity))
+                    ready[c] = plane[:, k : k + 1], children.take(np.arange(k * self.arity, (k + 1) * self.arity))
             plane, children = ready.pop(cell)
             if not np.isfinite(plane).any():
                 continue
@@ -251,5 +270,8 @@ BAD_AT_MOST = 1
 def joined(some):
     """Several Cells as one."""
     more = tuple(np.concatenate(c) for c in zip(*(s.more for s in some))) if some[0].more else ()
-    return Cells(*(np.concatenate([getattr(s, name) for s in some]) for name in ("lo", "hi", "count", "item")), more,
-                 np.concatenate([s.level for s in some]))
+    return Cells(
+        *(np.concatenate([getattr(s, name) for s in some]) for name in ("lo", "hi", "count", "item")),
+        more,
+        np.concatenate([s.level for s in some]),
+    )

@@ -1,7 +1,7 @@
 """kd-tree: cells halved along one axis at a time.
 
-Bentley (1975): in the middle, the axes in turn. Havran (2001): where the surface area heuristic says, by a sweep over all
-ends of the primitives' boxes, the boxes being those of the parts inside the cell ("perfect splits").
+Bentley (1975): in the middle, the axes in turn. Havran (2001): where the surface area heuristic says, by a sweep over
+all ends of the primitives' boxes, the boxes being those of the parts inside the cell ("perfect splits").
 """
 
 import math
@@ -57,8 +57,8 @@ class KdTree(CellTree):
     def _sorted_in(self, cells, number, axis, at, lo, hi):
         """The references of some cells' children: child, primitive, box of its part.
 
-        `number` says which cells they are; axis and position of their planes, and their children's lo and hi, are those of
-        all cells.
+        `number` says which cells they are; axis and position of their planes, and their children's lo and hi, are
+        those of all cells.
         """
         own_lo, own_hi = cells.more
         cell = np.repeat(number, cells.count)
@@ -72,7 +72,9 @@ class KdTree(CellTree):
         part_lo, part_hi = own_lo.take(ref, axis=0), own_hi.take(ref, axis=0)
         cut = np.flatnonzero((below & above).take(ref))
         if len(cut):
-            part_lo[cut], part_hi[cut] = self._part(cells.item[ref[cut]], lo[child[cut]], hi[child[cut]], part_lo[cut], part_hi[cut])
+            part_lo[cut], part_hi[cut] = self._part(
+                cells.item[ref[cut]], lo[child[cut]], hi[child[cut]], part_lo[cut], part_hi[cut]
+            )
             # A part that is empty is nowhere in the cell, not even near its faces.
             there = np.ones(len(ref), bool)
             there[cut] = (part_lo[cut] < part_hi[cut]).all(axis=1)
@@ -101,9 +103,9 @@ class KdTree(CellTree):
     def _cheapest(self, cells, cell):
         """Axis, position and cost of the cheapest plane of each cell.
 
-        The ends of all boxes are sorted, those of a cell together, by their positions as whole numbers; ends of boxes come
-        before beginnings at the same place. So, before a beginning, and after an end, the numbers of boxes on either
-        side are known by counting.
+        The ends of all boxes are sorted, those of a cell together, by their positions as whole numbers; ends of boxes
+        come before beginnings at the same place. So, before a beginning, and after an end, the numbers of boxes on
+        either side are known by counting.
         """
         m, count = len(cells.count), cells.count
         first = 2 * (np.cumsum(count) - count)
@@ -148,7 +150,9 @@ class KdTree(CellTree):
             if not len(better):
                 continue
             event = event.take(better)
-            exact = self._exact(position.take(event), begin.take(event), better, m, cell, begins, ends, own_lo[:, a], own_hi[:, a])
+            exact = self._exact(
+                position.take(event), begin.take(event), better, m, cell, begins, ends, own_lo[:, a], own_hi[:, a]
+            )
             best[better], axis[better], at[better] = least[better], a, exact
         return axis, at, 1.0 + best
 

@@ -36,10 +36,17 @@ class LeafCodes:
         return np.tile(self.lo, (len(ray), 1)), np.tile(self.hi, (len(ray), 1))
 
     def nodes(self):
-        """All cells, level by level: codes, boxes lo and hi, level, parent, and which leaf each is (-1 for inner cells)."""
+        """All cells, level by level: codes, boxes lo and hi, level, parent, and which leaf each is (-1 for inner
+        cells)."""
         level_of = np.floor(np.log10(self.code.astype(float) + 0.5)).astype(np.int64)
         order = np.argsort(self.code)
-        codes, lo, hi, levels, parents = [np.array([1])], [self.lo[None]], [self.hi[None]], [np.zeros(1, np.int64)], [np.full(1, -1)]
+        codes, lo, hi, levels, parents = (
+            [np.array([1])],
+            [self.lo[None]],
+            [self.hi[None]],
+            [np.zeros(1, np.int64)],
+            [np.full(1, -1)],
+        )
         begin = 0
         for level in range(1, self.depth + 1):
             deep = level_of >= level
@@ -74,14 +81,20 @@ class LeafCodes:
 
 
 class Linear(LeafCodes):
-    """Leaves in Morton order: of their names, filled up with zeros, ``key``, the last one not beyond a point's is its leaf."""
+    """Leaves in Morton order: of their names, filled up with zeros, ``key``, the last one not beyond a point's is its
+    leaf."""
 
     def __init__(self, tree, lo, hi):
         super().__init__(tree, lo, hi)
         level = tree.level[self.leaf].astype(np.int64)
         key = self.code * 10 ** (self.depth - level)
         order = np.argsort(key)
-        self.key, self.level, self.leaf, self.code = key[order], level[order].astype(np.int8), self.leaf[order], self.code[order]
+        self.key, self.level, self.leaf, self.code = (
+            key[order],
+            level[order].astype(np.int8),
+            self.leaf[order],
+            self.code[order],
+        )
 
     @property
     def nbytes(self):

@@ -47,7 +47,9 @@ class Lists:
         # Lists of the same length and sum of hashes are candidates; they are compared, for sums may collide.
         mixed = scrambled(self.items.astype(np.uint64) + np.uint64(1))
         sums = np.add.reduceat(mixed, self.start[filled]) if len(filled) else np.zeros(0, np.uint64)
-        _, first, group = np.unique(sums + scrambled(self.count[filled].astype(np.uint64)), return_index=True, return_inverse=True)
+        _, first, group = np.unique(
+            sums + scrambled(self.count[filled].astype(np.uint64)), return_index=True, return_inverse=True
+        )
         model = filled[first[group.ravel()]]
         alike = self.count[model] == self.count[filled]
         at = np.flatnonzero(alike)
@@ -147,7 +149,7 @@ class Visits:
         some = max(1, PAIRS // width)
         for start in range(0, len(ray), some):
             for first in range(0, self.n, width):
-                part, item = ray[start:start + some], np.arange(first, min(first + width, self.n))
+                part, item = ray[start : start + some], np.arange(first, min(first + width, self.n))
                 self.query.test(np.repeat(part, len(item)), np.tile(item, len(part)))
 
 

@@ -34,7 +34,7 @@ class MacroGrid(Grid):
         empty = np.flatnonzero(self.lists.count == 0)
         self.reach = np.zeros((1 if region == "cube" else 6, len(self.lists.count)), np.uint8)
         for start in range(0, len(empty), CELLS):
-            some = empty[start:start + CELLS]
+            some = empty[start : start + CELLS]
             index = self._indices(some)
             self.reach[:, some] = self._cube(sums, index)[None] if region == "cube" else self._box(sums, index)
         self.figures["memory"] += self.reach.nbytes
@@ -60,8 +60,10 @@ class MacroGrid(Grid):
 
     def _cube(self, sums, index):
         """How far cubes around cells reach: the chessboard distance to the nearest filled cell, less one."""
+
         def fits(reach):
             return self._empty(sums, index - reach, index + reach)
+
         return _most(fits, np.zeros(index.shape[1], np.int64))
 
     def _box(self, sums, index):
@@ -69,10 +71,12 @@ class MacroGrid(Grid):
         lo = hi = self._cube(sums, index)
         reach = np.stack([lo] * 3 + [hi] * 3)
         for side in range(6):
+
             def fits(length, side=side):
                 longer = reach.copy()
                 longer[side] = length
                 return self._empty(sums, index - longer[:3], index + longer[3:])
+
             reach[side] = _most(fits, reach[side])
         return reach
 
@@ -98,7 +102,8 @@ class MacroGrid(Grid):
 
 
 def _most(fits, least):
-    """The greatest number up to REACH, at least `least`, for which `fits` is true, by bisection; it is true for `least`."""
+    """The greatest number up to REACH, at least `least`, for which `fits` is true, by bisection; it is true for
+    `least`."""
     low, high = least.copy(), np.full(len(least), REACH)
     for _ in range(int(math.log2(REACH)) + 1):
         middle = (low + high + 1) // 2

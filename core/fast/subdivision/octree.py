@@ -93,7 +93,9 @@ class Octree(CellTree):
             middle, best = 0.5 * lo + 0.5 * hi, np.full(len(lo), np.inf)
             for k in range(PLANES):
                 at = middle + (median - middle) * (k / (PLANES - 1))
-                left, right = (np.bincount(cell[some], minlength=len(lo)) for some in (own_lo <= at[cell], own_hi >= at[cell]))
+                left, right = (
+                    np.bincount(cell[some], minlength=len(lo)) for some in (own_lo <= at[cell], own_hi >= at[cell])
+                )
                 cost = left * (b * c + (b + c) * (at - lo)) + right * (b * c + (b + c) * (hi - at))
                 cheaper = (cost < best) & (lo < at) & (at < hi)
                 plane[:, axis] = np.where(cheaper, at, plane[:, axis])

@@ -1,7 +1,7 @@
 """Grid with its data separated by dimension: per axis one list a slab of cells, instead of one list a cell.
 
-A cell's candidates are the intersection of its slabs' lists: the primitives whose boxes reach into it. None is lost; some
-more are tested than a list of the cell itself would name, most of all large and long ones.
+A cell's candidates are the intersection of its slabs' lists: the primitives whose boxes reach into it. None is lost;
+some more are tested than a list of the cell itself would name, most of all large and long ones.
 """
 
 import numpy as np
@@ -48,11 +48,19 @@ class SeparatedGrid(Grid):
             self.slabs.append(make(ranges(first[:, axis], extent[:, axis]), item, int(self.resolution[axis]), p.n))
             progress(len(self.slabs) / len(self.axes))
         count = self._slab_counts()
-        self.figures.update(surplus=self._surplus(first, extent), N_G=0, N_E=len(count), N_EE=int((count == 0).sum()), N_ER=references, depth=1,
-                            memory=sum(s.nbytes for s in self.slabs))
+        self.figures.update(
+            surplus=self._surplus(first, extent),
+            N_G=0,
+            N_E=len(count),
+            N_EE=int((count == 0).sum()),
+            N_ER=references,
+            depth=1,
+            memory=sum(s.nbytes for s in self.slabs),
+        )
 
     def _surplus(self, first, extent):
-        """References that intersecting lists adds to those of exact lists, as a part of these; from a sample of primitives."""
+        """References that intersecting lists adds to those of exact lists, as a part of these; from a sample of
+        primitives."""
         count = extent.prod(axis=1)
         some = np.arange(0, self.primitives.n, 1 + int(count.sum()) // SAMPLE)
         exact = 0
@@ -83,13 +91,22 @@ class SeparatedGrid(Grid):
         for axis in self.axes:
             k = np.arange(self.resolution[axis])
             low, high = np.tile(self.lo, (len(k), 1)), np.tile(self.hi, (len(k), 1))
-            low[:, axis], high[:, axis] = self.lo[axis] + k * self.width[axis], self.lo[axis] + (k + 1) * self.width[axis]
+            low[:, axis], high[:, axis] = (
+                self.lo[axis] + k * self.width[axis],
+                self.lo[axis] + (k + 1) * self.width[axis],
+            )
             lo.append(low)
             hi.append(high)
         count = self._slab_counts()
         n = len(count)
-        return Cells.make(np.concatenate(lo), np.concatenate(hi), np.repeat([0, 1], [1, n]), np.concatenate([[self.figures["N_ER"]], count]),
-                          np.repeat([False, True], [1, n]), np.repeat([-1, 0], [1, n]))
+        return Cells.make(
+            np.concatenate(lo),
+            np.concatenate(hi),
+            np.repeat([0, 1], [1, n]),
+            np.concatenate([[self.figures["N_ER"]], count]),
+            np.repeat([False, True], [1, n]),
+            np.repeat([-1, 0], [1, n]),
+        )
 
 
 class Bits:
@@ -112,9 +129,9 @@ class Bits:
         some = max(1, WORDS // width)
         items, counts = [], []
         for start in range(0, n, some):
-            word = slabs[0].words[index[0][start:start + some]]
+            word = slabs[0].words[index[0][start : start + some]]
             for slab, of in zip(slabs[1:], index[1:]):
-                word &= slab.words[of[start:start + some]]
+                word &= slab.words[of[start : start + some]]
             cell, place = np.nonzero(word)
             bits = np.unpackbits(word[cell, place].view(np.uint8).reshape(-1, 8), axis=1, bitorder="little")
             which, bit = np.nonzero(bits)
@@ -171,7 +188,8 @@ class Sorted:
 
 
 class _Visits(Visits):
-    """Visits of cells whose candidates are found as rays come: once for all rays that are in a cell at the same time."""
+    """Visits of cells whose candidates are found as rays come: once for all rays that are in a cell at the same
+    time."""
 
     def __init__(self, grid, query, mailbox):
         self.grid = grid

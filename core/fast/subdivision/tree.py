@@ -28,7 +28,8 @@ class CellTree(Structure):
     lists : Lists
         Of all cells; inner cells have none.
     links : ndarray, shape (6, m), or None
-        For walk = "links": per face (x, y, z below, then above) the smallest cell that covers it from outside, -1 for none.
+        For walk = "links": per face (x, y, z below, then above) the smallest cell that covers it from outside, -1 for
+        none.
     margin : float
         How far primitives outside a cell are still listed in it.
     """
@@ -50,8 +51,21 @@ class CellTree(Structure):
     def grow(self, root, progress, stop, max_depth, leaf_size, max_bytes, walk, lists):
         """Grow the tree and measure it."""
         more = self.MORE_BYTES + 24 * (walk == "links")
-        self.tree = t = growth.grow(self.divide, root, self.ARITY, self.primitives.n, stop, max_depth, leaf_size, max_bytes,
-                                    NODE_BYTES + more, REFERENCE_BYTES, progress, self.NAME, self.notices)
+        self.tree = t = growth.grow(
+            self.divide,
+            root,
+            self.ARITY,
+            self.primitives.n,
+            stop,
+            max_depth,
+            leaf_size,
+            max_bytes,
+            NODE_BYTES + more,
+            REFERENCE_BYTES,
+            progress,
+            self.NAME,
+            self.notices,
+        )
         self.lists = Lists(np.repeat(np.arange(t.n), t.count), t.item, t.n, lists == "shared")
         del t.item, t.count
         self.links = self.linked() if walk == "links" else None
@@ -60,16 +74,27 @@ class CellTree(Structure):
         area = box_area(t.lo, t.hi)
         references = int(count.sum())
         cost = float((area * np.where(leaf, count, 1)).sum())
-        self.figures.update(N_G=int((~leaf).sum()), N_E=int(leaf.sum()), N_EE=int((leaf & (count == 0)).sum()), N_ER=references,
-                            depth=int(t.level.max()), c_SAH=cost / float(area[0]) if area[0] > 0.0 else 0.0, memory=self.bytes())
+        self.figures.update(
+            N_G=int((~leaf).sum()),
+            N_E=int(leaf.sum()),
+            N_EE=int((leaf & (count == 0)).sum()),
+            N_ER=references,
+            depth=int(t.level.max()),
+            c_SAH=cost / float(area[0]) if area[0] > 0.0 else 0.0,
+            memory=self.bytes(),
+        )
         if self.lists.list_of is not None:
             self.figures["N_L"] = self.lists.lists
 
     def bytes(self):
         """Memory of the tree."""
         t = self.tree
-        return (sum(a.nbytes for a in (t.lo, t.hi, t.level, t.parent, t.child, t.plane)) + self.lists.nbytes
-                + self.lists.count.nbytes + (0 if self.links is None else self.links.nbytes))
+        return (
+            sum(a.nbytes for a in (t.lo, t.hi, t.level, t.parent, t.child, t.plane))
+            + self.lists.nbytes
+            + self.lists.count.nbytes
+            + (0 if self.links is None else self.links.nbytes)
+        )
 
     def linked(self):
         """The links of all cells, level by level from the root."""
@@ -201,7 +226,9 @@ class Walk:
         if self.structure.ARITY == 2:
             axis = self.structure.axis.take(cell)
             place = ray + axis * self.n
-            return (self.crossing(self.tree.plane.ravel().take(axis * self.tree.n + cell), place) <= t) ^ self.negative.take(place)
+            return (
+                self.crossing(self.tree.plane.ravel().take(axis * self.tree.n + cell), place) <= t
+            ) ^ self.negative.take(place)
         k = 0
         for axis in range(3):
             place = ray + axis * self.n
@@ -240,7 +267,8 @@ class Walk:
             cell = following.take(on).astype(np.int64)
 
     def visit(self, ray, cell, t_out):
-        """Test what is in leaves that rays leave at `t_out`; the rays that go on, from where, and which of `ray` they are."""
+        """Test what is in leaves that rays leave at `t_out`; the rays that go on, from where, and which of `ray` they
+        are."""
         self.visits.enter(ray, cell)
         on = np.flatnonzero((self.query.t.take(ray) > t_out) & (t_out < self.t_end.take(ray)))
         return ray.take(on), t_out.take(on), on
@@ -288,7 +316,7 @@ class Walk:
     def intervals(self, ray):
         """First all of a ray is cut into intervals, one a leaf; then they are walked."""
         for start in range(0, len(ray), RAYS):
-            self._walk_intervals(*self._prepare(ray[start:start + RAYS]))
+            self._walk_intervals(*self._prepare(ray[start : start + RAYS]))
 
     def _prepare(self, ray):
         """The (ray, leaf) pairs of rays, in order along each ray, with their beginnings."""
@@ -329,14 +357,14 @@ class Walk:
         always sorted.
         """
         for start in range(0, len(ray), RAYS):
-            self._walk_heap(ray[start:start + RAYS])
+            self._walk_heap(ray[start : start + RAYS])
 
     def _walk_heap(self, ray):
         n = len(ray)
         height = (3 if self.structure.ARITY == 8 else 1) * int(self.tree.level.max()) + 2
         # Entry 0 is the end of the ray, and is never taken.
         stack, begins = np.zeros(height * n, np.int32), np.empty(height * n)
-        begins[:n], begins[n:2 * n] = self.t_end[ray], self.t_in[ray]
+        begins[:n], begins[n : 2 * n] = self.t_end[ray], self.t_in[ray]
         top = np.ones(n, np.int64)
         slot = np.arange(n)
         while len(slot):
@@ -356,7 +384,9 @@ class Walk:
                 if self.query.counts:
                     self.query.counts.steps(r[at])
                 inner = slot.take(at)
-                for some, child, begin in reversed(list(self.halves(cell.take(at), r.take(at), t_in.take(at), t_out.take(at)))):
+                for some, child, begin in reversed(
+                    list(self.halves(cell.take(at), r.take(at), t_in.take(at), t_out.take(at)))
+                ):
                     mine = inner.take(some)
                     top[mine] += 1
                     place = top.take(mine) * n + mine

@@ -1,8 +1,9 @@
 """General BSP tree: planes of any orientation, from the polygons themselves or from fixed directions.
 
-Fuchs, Kedem and Naylor (1980); front to back along a ray. A division has three parts: what lies below the plane, what lies
-in it, and what lies above it. Polygons that straddle a plane are cut into fragments, and a fragment is in its own part
-only; other primitives are in both parts. A ray near a plane looks into both, so nothing depends on the rounding of a cut.
+Fuchs, Kedem and Naylor (1980); front to back along a ray. A division has three parts: what lies below the plane, what
+lies in it, and what lies above it. Polygons that straddle a plane are cut into fragments, and a fragment is in its
+own part only; other primitives are in both parts. A ray near a plane looks into both, so nothing depends on the
+rounding of a cut.
 """
 
 import math
@@ -30,7 +31,7 @@ class BspTree(CellTree):
     NAME = "bsp-tree"
 
     def build(self, progress, planes, directions, stop, max_depth, leaf_size, max_bytes, mailbox, lists):
-        self.planes, self.directions = planes, DIRECTIONS[:directions if planes == "slabs" else 3]
+        self.planes, self.directions = planes, DIRECTIONS[: directions if planes == "slabs" else 3]
         root, n = self.root(), len(self.primitives)
         root.boxes = [p.outline() if hasattr(p, "outline") else None for p in self.primitives]
         self.grow(root, progress, stop, max_depth or depth_for(n), leaf_size, max_bytes, "heap", lists)
@@ -122,7 +123,8 @@ class BspTree(CellTree):
                     stack.append((child, low, high))
 
     def _sides(self, ray, plane):
-        """Until when a ray is on the side where it comes from, since when it is on the other, and whether it comes from above."""
+        """Until when a ray is on the side where it comes from, since when it is on the other, and whether it comes
+        from above."""
         a, b, c, w = plane
         distance = w - (a * ray.o[0] + b * ray.o[1] + c * ray.o[2])
         speed = a * ray.d[0] + b * ray.d[1] + c * ray.d[2]

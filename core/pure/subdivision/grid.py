@@ -60,7 +60,9 @@ class Grid(Structure):
         """Raise before anything is allocated that would not fit into half of the free memory."""
         most = int(min(0.5 * free_memory() / CELL_BYTES, 2**31 - 1))
         if math.prod(self.resolution) > most:
-            raise MemoryEstimateError(too_many(self.NAME, self.resolution, most, size, len(self.primitives), rule, density))
+            raise MemoryEstimateError(
+                too_many(self.NAME, self.resolution, most, size, len(self.primitives), rule, density)
+            )
 
     def _list(self, progress, lists):
         """Make the cells' lists, and fill in the figures."""
@@ -80,8 +82,10 @@ class Grid(Structure):
         # A primitive is in one piece: where its box is one cell wide along two axes, it is in all of the row's cells.
         sure = sum(f != l for f, l in zip(first, last)) <= 1
         for index in itertools.product(*ranges):
-            if sure or primitive.overlaps([self._plane(axis, index[axis]) - self.margin for axis in range(3)],
-                                          [self._plane(axis, index[axis] + 1) + self.margin for axis in range(3)]):
+            if sure or primitive.overlaps(
+                [self._plane(axis, index[axis]) - self.margin for axis in range(3)],
+                [self._plane(axis, index[axis] + 1) + self.margin for axis in range(3)],
+            ):
                 number = self._number(index)
                 if not self.lists[number]:
                     self.lists[number] = []
@@ -107,9 +111,14 @@ class Grid(Structure):
         sx, sy, sz = (h - l for l, h in zip(self.lo, self.hi))
         root = sx * sy + sy * sz + sz * sx
         self.figures.update(
-            N_G=0, N_E=len(self.lists), N_EE=sum(not cell for cell in self.lists), N_ER=references, depth=1,
+            N_G=0,
+            N_E=len(self.lists),
+            N_EE=sum(not cell for cell in self.lists),
+            N_ER=references,
+            depth=1,
             c_SAH=(wx * wy + wy * wz + wz * wx) * references / root if root > 0.0 else 0.0,
-            memory=memory_of(self.lists))
+            memory=memory_of(self.lists),
+        )
         if self.parameters["lists"] == "shared":
             self.figures["N_L"] = len(set(filter(None, self.lists)))
 
@@ -170,13 +179,13 @@ class Grid(Structure):
             if region:
                 t_in = t_out
                 continue
-            if how == "subtract":           # the classic form: what was walked is taken from all three
+            if how == "subtract":  # the classic form: what was walked is taken from all three
                 start = t_out
                 L = [l - nearest for l in L]
                 L[axis] = D[axis]
-            elif how == "add":              # Amanatides and Woo
+            elif how == "add":  # Amanatides and Woo
                 L[axis] += D[axis]
-            else:                           # from the plane's index: nothing accumulates
+            else:  # from the plane's index: nothing accumulates
                 L[axis] = distance_to_plane(axis)
             t_in = t_out
 
@@ -185,7 +194,8 @@ class Grid(Structure):
         return self.lists[number]
 
     def region(self, number, cell):
-        """The first and last cells, per axis, of an empty region around an empty cell; None where no such region is known."""
+        """The first and last cells, per axis, of an empty region around an empty cell; None where no such region is
+        known."""
         return None
 
     def _leap(self, ray, cell, region):
@@ -218,5 +228,6 @@ class Grid(Structure):
             lo.append([self._plane(axis, index[axis]) for axis in range(3)])
             hi.append([self._plane(axis, index[axis] + 1) for axis in range(3)])
         n = len(self.lists)
-        return Cells.make(lo, hi, [0] + [1] * n, [self.figures["N_ER"], *map(len, self.lists)], [False] + [True] * n,
-                          [-1] + [0] * n)
+        return Cells.make(
+            lo, hi, [0] + [1] * n, [self.figures["N_ER"], *map(len, self.lists)], [False] + [True] * n, [-1] + [0] * n
+        )

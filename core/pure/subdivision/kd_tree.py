@@ -1,7 +1,7 @@
 """kd-tree: cells halved along one axis at a time.
 
-Bentley (1975): in the middle, the axes in turn. Havran (2001): where the surface area heuristic says, by a sweep over all
-ends of the primitives' boxes, the boxes being those of the parts inside the cell ("perfect splits").
+Bentley (1975): in the middle, the axes in turn. Havran (2001): where the surface area heuristic says, by a sweep over
+all ends of the primitives' boxes, the boxes being those of the parts inside the cell ("perfect splits").
 """
 
 import math
@@ -21,8 +21,13 @@ class KdTree(CellTree):
         self.split, self.clip, self.empty_bonus = split, clip, empty_bonus
         root, n = self.root(), len(self.primitives)
         # Boxes larger by the margin: what overlaps a cell by it counts as inside.
-        root.boxes = [([max(x - self.margin, l) for x, l in zip(p.lo, root.lo)], [min(x + self.margin, h) for x, h in zip(p.hi, root.hi)])
-                      for p in self.primitives]
+        root.boxes = [
+            (
+                [max(x - self.margin, l) for x, l in zip(p.lo, root.lo)],
+                [min(x + self.margin, h) for x, h in zip(p.hi, root.hi)],
+            )
+            for p in self.primitives
+        ]
         self.grow(root, progress, stop, max_depth or depth_for(n), leaf_size, max_bytes, walk, lists)
 
     def divide(self, node):
@@ -65,7 +70,8 @@ class KdTree(CellTree):
         return axis, 0.5 * node.lo[axis] + 0.5 * node.hi[axis], None
 
     def _cheapest(self, node):
-        """Axis, position and cost of the cheapest plane: a sweep over the ends of all boxes, from the lowest to the highest.
+        """Axis, position and cost of the cheapest plane: a sweep over the ends of all boxes, from the lowest to the
+        highest.
 
         Positions are whole numbers; ends of boxes come before beginnings at the same place. So, before a beginning, and
         after an end, the numbers of boxes on either side are known by counting.

@@ -31,30 +31,50 @@ class MacroGrid(Grid):
         sums = self._sums()
         for number, index in enumerate(itertools.product(*map(range, self.resolution))):
             if not self.lists[number]:
-                self.reach[self.sides * number:self.sides * (number + 1)] = self._reach(sums, index)
+                self.reach[self.sides * number : self.sides * (number + 1)] = self._reach(sums, index)
         self.figures["memory"] += len(self.reach)
 
     def _sums(self):
         """Numbers of filled cells below and before each corner of the grid, by corner."""
         nx, ny, nz = self.resolution
-        sums = {(x, y, z): 0 for x in range(nx + 1) for y in range(ny + 1) for z in range(nz + 1) if not (x and y and z)}
+        sums = {
+            (x, y, z): 0 for x in range(nx + 1) for y in range(ny + 1) for z in range(nz + 1) if not (x and y and z)
+        }
         for x, y, z in itertools.product(range(nx), range(ny), range(nz)):
             sums[x + 1, y + 1, z + 1] = (
-                bool(self.lists[self._number((x, y, z))]) + sums[x, y + 1, z + 1] + sums[x + 1, y, z + 1] + sums[x + 1, y + 1, z]
-                - sums[x, y, z + 1] - sums[x, y + 1, z] - sums[x + 1, y, z] + sums[x, y, z])
+                bool(self.lists[self._number((x, y, z))])
+                + sums[x, y + 1, z + 1]
+                + sums[x + 1, y, z + 1]
+                + sums[x + 1, y + 1, z]
+                - sums[x, y, z + 1]
+                - sums[x, y + 1, z]
+                - sums[x + 1, y, z]
+                + sums[x, y, z]
+            )
         return sums
 
     def _empty(self, sums, lo, hi):
         """Whether all cells lo .. hi are empty; what lies outside the grid is."""
         a = [max(x, 0) for x in lo]
         b = [min(x + 1, n) for x, n in zip(hi, self.resolution)]
-        return not (sums[b[0], b[1], b[2]] - sums[a[0], b[1], b[2]] - sums[b[0], a[1], b[2]] - sums[b[0], b[1], a[2]]
-                    + sums[a[0], a[1], b[2]] + sums[a[0], b[1], a[2]] + sums[b[0], a[1], a[2]] - sums[a[0], a[1], a[2]])
+        return not (
+            sums[b[0], b[1], b[2]]
+            - sums[a[0], b[1], b[2]]
+            - sums[b[0], a[1], b[2]]
+            - sums[b[0], b[1], a[2]]
+            + sums[a[0], a[1], b[2]]
+            + sums[a[0], b[1], a[2]]
+            + sums[b[0], a[1], a[2]]
+            - sums[a[0], a[1], a[2]]
+        )
 
     def _reach(self, sums, index):
         """How far a cell's region reaches: a cube; or that, made longer on one side after the other."""
+
         def fits(reach):
-            return self._empty(sums, [x - r for x, r in zip(index, reach[:3])], [x + r for x, r in zip(index, reach[3:])])
+            return self._empty(
+                sums, [x - r for x, r in zip(index, reach[:3])], [x + r for x, r in zip(index, reach[3:])]
+            )
 
         reach, top = [0] * 6, max(self.resolution)
         while reach[0] < min(REACH, top) and fits([r + 1 for r in reach]):
@@ -67,7 +87,9 @@ class MacroGrid(Grid):
         return reach
 
     def region(self, number, cell):
-        reach = self.reach[self.sides * number:self.sides * (number + 1)]
+        reach = self.reach[self.sides * number : self.sides * (number + 1)]
         below, above = (reach * 3, reach * 3) if self.sides == 1 else (reach[:3], reach[3:])
-        return ([max(x - r, 0) for x, r in zip(cell, below)],
-                [min(x + r, n - 1) for x, r, n in zip(cell, above, self.resolution)])
+        return (
+            [max(x - r, 0) for x, r in zip(cell, below)],
+            [min(x + r, n - 1) for x, r, n in zip(cell, above, self.resolution)],
+        )

@@ -58,8 +58,11 @@ class Octree(CellTree):
         below = [l <= m + margin for l, m in zip(primitive.lo, plane)]
         above = [h >= m - margin for h, m in zip(primitive.hi, plane)]
         # By their boxes first. In one octant alone: it is in there, for it is in the cell.
-        some = [child for k, child in enumerate(children)
-                if all((above if k >> (2 - axis) & 1 else below)[axis] for axis in range(3))]
+        some = [
+            child
+            for k, child in enumerate(children)
+            if all((above if k >> (2 - axis) & 1 else below)[axis] for axis in range(3))
+        ]
         if len(some) == 1:
             return some
         return [c for c in some if primitive.overlaps([x - margin for x in c.lo], [x + margin for x in c.hi])]

@@ -1,7 +1,7 @@
 """Grid with its data separated by dimension: per axis one list a slab of cells, instead of one list a cell.
 
-A cell's candidates are the intersection of its slabs' lists: the primitives whose boxes reach into it. None is lost; some
-more are tested than a list of the cell itself would name, most of all large and long ones.
+A cell's candidates are the intersection of its slabs' lists: the primitives whose boxes reach into it. None is lost;
+some more are tested than a list of the cell itself would name, most of all large and long ones.
 """
 
 import functools
@@ -29,7 +29,8 @@ class SeparatedGrid(Grid):
     axes : list of int
         Those that are divided: all three, or rows and columns only.
     slabs : dict
-        Per axis the slabs' lists: whole numbers whose bit k says that primitive k reaches into the slab; or ascending lists.
+        Per axis the slabs' lists: whole numbers whose bit k says that primitive k reaches into the slab; or ascending
+        lists.
     """
 
     NAME = "separated-grid"
@@ -51,20 +52,32 @@ class SeparatedGrid(Grid):
         self.count = [len(items) for a in self.axes for items in self.slabs[a]]
         if intersect == "bits":
             self.slabs = {a: [sum(1 << item for item in items) for items in some] for a, some in self.slabs.items()}
-        self.figures.update(surplus=self._surplus(), N_G=0, N_E=len(self.count), N_EE=self.count.count(0), N_ER=sum(self.count), depth=1,
-                            memory=memory_of(self.slabs))
+        self.figures.update(
+            surplus=self._surplus(),
+            N_G=0,
+            N_E=len(self.count),
+            N_EE=self.count.count(0),
+            N_ER=sum(self.count),
+            depth=1,
+            memory=memory_of(self.slabs),
+        )
 
     def _surplus(self):
-        """References that intersecting lists adds to those of exact lists, as a part of these; from a sample of primitives."""
-        ranges = [[range(self._index(a, p.lo[a] - self.margin), self._index(a, p.hi[a] + self.margin) + 1) for a in range(3)]
-                  for p in self.primitives]
+        """References that intersecting lists adds to those of exact lists, as a part of these; from a sample of
+        primitives."""
+        ranges = [
+            [range(self._index(a, p.lo[a] - self.margin), self._index(a, p.hi[a] + self.margin) + 1) for a in range(3)]
+            for p in self.primitives
+        ]
         every = 1 + sum(math.prod(map(len, r)) for r in ranges) // SAMPLE
         listed = exact = 0
         for primitive, some in zip(self.primitives[::every], ranges[::every]):
             for index in itertools.product(*some):
                 listed += 1
-                exact += primitive.overlaps([self._plane(a, index[a]) - self.margin for a in range(3)],
-                                            [self._plane(a, index[a] + 1) + self.margin for a in range(3)])
+                exact += primitive.overlaps(
+                    [self._plane(a, index[a]) - self.margin for a in range(3)],
+                    [self._plane(a, index[a] + 1) + self.margin for a in range(3)],
+                )
         return listed / max(exact, 1) - 1.0
 
     def _refuse_too_many(self, size, rule, density):
@@ -100,5 +113,8 @@ def _common_bits(vectors):
 def _common_sorted(lists):
     """What is in all of some ascending lists: the entries of the shortest, looked up in the others by bisection."""
     shortest, *others = sorted(lists, key=len)
-    return [item for item in shortest
-            if all((k := bisect_left(other, item)) < len(other) and other[k] == item for other in others)]
+    return [
+        item
+        for item in shortest
+        if all((k := bisect_left(other, item)) < len(other) and other[k] == item for other in others)
+    ]

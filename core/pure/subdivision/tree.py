@@ -97,10 +97,13 @@ class CellTree(Structure):
         self.margin = max(TREE_OVERLAP * longest, 64.0 * EPSILON * max(map(abs, (*lo, *hi))), 1e-300)
         # A flat scene gets depth on one side only, or its plane would be the plane of division.
         hi = [h if h - l > 4.0 * self.margin else h + longest for l, h in zip(lo, hi)]
-        return Node(tuple(x - self.margin for x in lo), tuple(x + self.margin for x in hi), list(range(len(self.primitives))))
+        return Node(
+            tuple(x - self.margin for x in lo), tuple(x + self.margin for x in hi), list(range(len(self.primitives)))
+        )
 
     def grow(self, root, progress, stop, max_depth, leaf_size, max_bytes, walk, lists):
-        """Divide cells until they are small enough (`stop` is depth), cheap enough (cost), or memory is used (memory)."""
+        """Divide cells until they are small enough (`stop` is depth), cheap enough (cost), or memory is used
+        (memory)."""
         self.mail = [None] * len(self.primitives)
         limit = max(REFERENCES_AT_LEAST, REFERENCES_PER_PRIMITIVE * len(self.primitives))
         references, used, self.nodes = len(root.items), root.bytes(), [root]
@@ -169,7 +172,7 @@ class CellTree(Structure):
                 if plane == math.inf:
                     continue
                 if axis == face % 3:
-                    upper = face < 3                # the half next to the face
+                    upper = face < 3  # the half next to the face
                 elif node.lo[axis] >= plane:
                     upper = True
                 elif node.hi[axis] <= plane:
@@ -184,9 +187,14 @@ class CellTree(Structure):
         """Fill in the figures."""
         leaves = [node for node in self.nodes if not node.children]
         self.figures.update(
-            N_G=len(self.nodes) - len(leaves), N_E=len(leaves), N_EE=sum(not node.items for node in leaves),
-            N_ER=sum(len(node.items) for node in leaves), depth=max(node.level for node in leaves),
-            c_SAH=float(self.cells().cost.sum()), memory=sum(node.bytes() for node in self.nodes))
+            N_G=len(self.nodes) - len(leaves),
+            N_E=len(leaves),
+            N_EE=sum(not node.items for node in leaves),
+            N_ER=sum(len(node.items) for node in leaves),
+            depth=max(node.level for node in leaves),
+            c_SAH=float(self.cells().cost.sum()),
+            memory=sum(node.bytes() for node in self.nodes),
+        )
         if self.parameters["lists"] == "shared":
             self.figures["N_L"] = len({id(node.items) for node in leaves if node.items})
 
@@ -269,8 +277,14 @@ class CellTree(Structure):
         below = [len(node.items) for node in self.nodes]
         for node in reversed(self.nodes[1:]):
             below[node.parent.number] += below[node.number]
-        return Cells.make([node.lo for node in self.nodes], [node.hi for node in self.nodes], [node.level for node in self.nodes], below,
-                          [not node.children for node in self.nodes], [node.parent.number if node.parent else -1 for node in self.nodes])
+        return Cells.make(
+            [node.lo for node in self.nodes],
+            [node.hi for node in self.nodes],
+            [node.level for node in self.nodes],
+            below,
+            [not node.children for node in self.nodes],
+            [node.parent.number if node.parent else -1 for node in self.nodes],
+        )
 
 
 def crossing(ray, axis, plane):
