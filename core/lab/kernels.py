@@ -8,6 +8,7 @@ no, a ghost where the test says yes and the ray does not meet. Both cores decide
 import math
 import time
 from collections import Counter
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -50,10 +51,11 @@ COLUMNS = (*COSTS, *_columns(TRIANGLE_CASES), *_columns(BOX_CASES))
 
 MEANINGS = {
     "ns_fast, ns_pure": "nanoseconds a test, the least of all repeats; about half of the tests hit",
-    "mul, add, div, cmp": "operations of a test that hits the front; additions and subtractions are one; what is calculated once a ray or once a triangle is left out",
+    "mul, add, div, cmp": "operations of a test that hits the front; additions and subtractions are one; what is calculated "
+                          "once a ray or once a triangle is left out",
     "bytes": "calculated beforehand for each triangle or box and kept, besides its corners",
-    "edges, vertices": "rays from inside a closed mesh to points of shared edges, and to vertices. Lost: rays that meet no triangle; "
-                       "ghosts: triangles hit that the ray passes by",
+    "edges, vertices": "rays from inside a closed mesh to points of shared edges, and to vertices. "
+                       "Lost: rays that meet no triangle; ghosts: triangles hit that the ray passes by",
     "sliver": "rays to and beside triangles so many times as long as wide",
     "face": "rays along a face of a box, one component of the direction +0 or -0",
     "edge": "rays along an edge, two components +0 or -0",
@@ -141,7 +143,7 @@ def prepared(test):
     """Bytes that a triangle's test, or a box's, keeps for it besides its corners."""
     if test in BOX_TESTS:
         return 0
-    kind, = fast_triangles.tested([Triangles(np.eye(3).reshape(9, 1), np.zeros(1, np.int32), np.zeros(1, np.int64), np.zeros(1, bool))], test)
+    kind, = fast_triangles.tested([_triangles(np.eye(3)[None])], test)
     return sum(row.itemsize for row in getattr(kind, "data", ()))
 
 
@@ -150,7 +152,8 @@ def prepared(test):
 def _triangles(corners):
     """Triangles of the numpy core; corners of shape (n, 3, 3)."""
     n = len(corners)
-    return Triangles(np.ascontiguousarray(corners.reshape(n, 9).T), np.zeros(n, np.int32), np.arange(n), np.zeros(n, bool))
+    xyz = np.ascontiguousarray(corners.reshape(n, 9).T)
+    return Triangles(xyz, np.zeros(n, np.int32), np.arange(n), np.zeros(n, bool))
 
 
 def timings(repeats=5, seed=0, fast_pairs=FAST_PAIRS, pure_pairs=PURE_PAIRS):
@@ -177,7 +180,8 @@ def timings(repeats=5, seed=0, fast_pairs=FAST_PAIRS, pure_pairs=PURE_PAIRS):
     kinds = {name: fast_triangles.tested([_triangles(corners)], name)[0] for name in TRIANGLE_TESTS}
     columns = np.ascontiguousarray(lo.T), np.ascontiguousarray(hi.T)
     fast = {name: lambda kind=kind: len(kind.intersect(rays, pairs, pairs, far)[0]) for name, kind in kinds.items()}
-    fast |= {name: lambda test=test: int(test(rays, pairs, *columns, far)[2].sum()) for name, test in fast_boxes.TESTS.items()}
+    fast |= {name: lambda test=test: int(test(rays, pairs, *columns, far)[2].sum())
+             for name, test in fast_boxes.TESTS.items()}
 
     m = min(pure_pairs, n)
     single = [Ray(o, d) for o, d in zip(origins[:m].tolist(), directions[:m].tolist())]
@@ -265,20 +269,22 @@ def mesh_answers(n_rays=400, seed=0):
         directions = target - origins
         # What a ray can meet has a corner in common with what it is aimed at.
         near = {r: np.flatnonzero(np.isin(triangles, ends[r]).any(axis=1)) for r in range(n_rays)}
-        truth = {(r, k): _meets(origins[r], directions[r], corners[k]) for r, items in near.items() for k in items.tolist()}
-        inside = [r for r, items in near.items() if any(truth[r, k] for k in items.tolist())]
+
+        @cache
+        def meets(r, k):
+            return _meets(origins[r], directions[r], corners[k])
+        inside = [r for r, items in near.items() if any(meets(r, k) for k in items.tolist())]
         ray, item = (x.ravel() for x in np.meshgrid(np.arange(n_rays), np.arange(len(corners)), indexing="ij"))
         for name, row in results.items():
             said = _reported(name, corners, origins, directions, ray, item)
             met = {r for r, _ in said}
             row[f"{case} lost"] = sum(r not in met for r in inside)
-            row[f"{case} ghosts"] = sum(not (truth[pair] if pair in truth else _meets(origins[pair[0]], directions[pair[0]], corners[pair[1]]))
-                                        for pair in said)
+            row[f"{case} ghosts"] = sum(not meets(*pair) for pair in said)
     return results
 
 
 def sliver_answers(n_rays=200, seed=0):
-    """Lost hits and ghosts on slivers; half of the rays are aimed inside, half beside, by a tenth of the width at least."""
+    """Lost hits and ghosts on slivers; half of the rays are aimed inside, half beside, by a tenth of the width or more."""
     rng = np.random.default_rng(seed)
     results = {name: {} for name in TRIANGLE_TESTS}
     for case, aspect in zip(SLIVERS, ASPECTS):
@@ -287,7 +293,8 @@ def sliver_answers(n_rays=200, seed=0):
         corners = np.stack([a, a + along, a + rng.random((n_rays, 1)) * along + across / aspect], axis=1)
         weight = rng.uniform(0.1, 0.4, (n_rays, 2))
         weight[::2, 1] *= -1.0                          # beside the long edge
-        target = (corners[:, 0] + weight[:, :1] * (corners[:, 1] - corners[:, 0]) + weight[:, 1:] * (corners[:, 2] - corners[:, 0]))
+        e, f = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+        target = corners[:, 0] + weight[:, :1] * e + weight[:, 1:] * f
         directions = rng.normal(size=(n_rays, 3))
         origins = target - directions
         truth = {(r, r) for r in range(n_rays) if _meets(origins[r], directions[r], corners[r])}
@@ -379,7 +386,8 @@ def text(result):
     rows = result["rows"]
     parts = [report.table(rows, COSTS)]
     for names, cases in ((TRIANGLE_TESTS, TRIANGLE_CASES), (BOX_TESTS, BOX_CASES)):
-        own = [{"test": r["test"], **{c: f"{r[f'{c} lost']} + {r[f'{c} ghosts']}" for c in cases}} for r in rows if r["test"] in names]
+        own = [{"test": r["test"], **{c: f"{r[f'{c} lost']} + {r[f'{c} ghosts']}" for c in cases}}
+               for r in rows if r["test"] in names]
         parts.append("lost + ghosts\n" + report.table(own, ("test", *cases)))
     parts.append("\n".join(f"{name}: {meaning}" for name, meaning in result["meanings"].items()))
     return "\n\n".join(parts)

@@ -1,4 +1,4 @@
-"""Tests of a ray against a triangle or a box: both cores alike, right on well-shaped ones, counted, wrong where they are known to be."""
+"""Tests of a ray against a triangle or a box: alike in both cores, right if well-shaped, wrong where known."""
 import csv
 import io
 import json
@@ -27,7 +27,7 @@ def triangles(kind, n=N):
     corners = rng.normal(size=(n, 3, 3))
     if kind == "slivers":
         corners[:, 2] = corners[:, 1] + 1e-9 * rng.normal(size=(n, 3))
-    if kind == "upright":                               # edges along axes: the other branch of Badouel's test, zeros everywhere
+    if kind == "upright":                               # edges along axes: Badouel's other branch, zeros everywhere
         corners = rng.integers(-2, 3, (n, 3, 3)).astype(float)
     if kind == "without area":
         corners[:, 2] = corners[:, 0]
@@ -79,7 +79,7 @@ def test_well_shaped_triangles_are_right(name):
         truth = exact.triangle_plane(o, d, *c)
         e, f = np.subtract(c[1], c[0]), np.subtract(c[2], c[0])
         n = np.cross(e, f)
-        seen = abs(n @ d) / np.linalg.norm(n) / np.linalg.norm(d) * np.linalg.norm(n) / np.linalg.norm(e) / np.linalg.norm(f)
+        seen = abs(n @ d) / np.linalg.norm(d) / np.linalg.norm(e) / np.linalg.norm(f)
         if seen < 0.05 or abs(min(truth[1:])) < 1e-10:  # nearly edge-on or a sliver, or nearly at an edge
             continue
         judged += 1
@@ -121,7 +121,8 @@ def test_the_parameter_declares_which_choices_are_inexact():
 def test_operations_are_those_stated(name):
     function = (Triangle.intersect if name == "watertight" else
                 pure_triangles.TESTS[name][1] if name in pure_triangles.TESTS else pure_boxes.TESTS[name])
-    stated = re.search(r"Operations: (\d+) multiplications, (\d+) additions, (\d+) divisions?, (\d+) comparisons", function.__doc__)
+    pattern = r"Operations: (\d+) multiplications, (\d+) additions, (\d+) divisions?, (\d+) comparisons"
+    stated = re.search(pattern, function.__doc__)
     assert list(kernels.operations(name).values()) == [int(x) for x in stated.groups()]
 
 
@@ -178,9 +179,10 @@ def test_boxes_in_both_cores(name, case):
 def test_boxes_well_inside_and_well_outside(name):
     rng = np.random.default_rng(2)
     met = 0
+    lo, hi = (-1.0, -1.0, -1.0), (1.0, 2.0, 1.5)
     for _ in range(400):
         o, d = rng.normal(size=3) * 3, rng.normal(size=3)
-        found, truth = pure_boxes.TESTS[name](Ray(o, d), (-1.0,) * 3, (1.0, 2.0, 1.5), math.inf), exact.box(o, d, (-1.0,) * 3, (1.0, 2.0, 1.5))
+        found, truth = pure_boxes.TESTS[name](Ray(o, d), lo, hi, math.inf), exact.box(o, d, lo, hi)
         hit = truth is not None and truth[1] >= 0
         assert (found is not None) == hit
         if hit:
@@ -191,11 +193,12 @@ def test_boxes_well_inside_and_well_outside(name):
 
 
 def test_known_nan_cases():
-    """In the upper plane of a box, along it: +0 gives (-inf, NaN), -0 gives (inf, NaN); in the lower one (NaN, inf) and (NaN, -inf)."""
+    """Along a plane of a box: in the upper one +0 gives (-inf, NaN), -0 (inf, NaN); in the lower (NaN, inf), (NaN, -inf)."""
     lo, hi = (0.0, 0.0, 0.0), (1.0, 1.0, 1.0)
-    said = {name: [test(Ray((x, 0.5, -1.0), (zero, 0.125, 1.0)), lo, hi, math.inf) is not None for x in (0.0, 1.0) for zero in (0.0, -0.0)]
-            for name, test in pure_boxes.TESTS.items()}
-    assert said == {"slab-plain": [True, False, True, False], "slab-branchless": [True, True, False, False], "slab-robust": [True] * 4}
+    rays = [Ray((x, 0.5, -1.0), (zero, 0.125, 1.0)) for x in (0.0, 1.0) for zero in (0.0, -0.0)]
+    said = {name: [test(ray, lo, hi, math.inf) is not None for ray in rays] for name, test in pure_boxes.TESTS.items()}
+    assert said == {"slab-plain": [True, False, True, False], "slab-branchless": [True, True, False, False],
+                    "slab-robust": [True] * 4}
     # Beside the plane there is no NaN, and nothing is met.
     for name, test in pure_boxes.TESTS.items():
         for zero in (0.0, -0.0):
@@ -219,15 +222,16 @@ def test_touching_rays_touch():
 
 
 def test_verb(capsys, tmp_path):
-    assert main(["kernels", "--rays", "10", "--repeats", "1", "--seed", "3", "--out", str(tmp_path / "o"), "--json"]) == DONE
+    out = tmp_path / "o"
+    assert main(["kernels", "--rays", "10", "--repeats", "1", "--seed", "3", "--out", str(out), "--json"]) == DONE
     record = json.loads(capsys.readouterr().out)
     rows = {row["test"]: row for row in record["rows"]}
     assert list(rows) == [*kernels.TRIANGLE_TESTS, *kernels.BOX_TESTS] and record["seed"] == 3
     for row in rows.values():
         assert row["ns_fast"] > 0 and row["ns_pure"] > 0 and 0.25 < row["hits"] < 0.75
-    lines = list(csv.DictReader(io.StringIO((tmp_path / "o" / "kernels.csv").read_text())))
+    lines = list(csv.DictReader(io.StringIO((out / "kernels.csv").read_text())))
     assert [line["test"] for line in lines] == list(rows) and lines[0]["mul"] == str(rows["watertight"]["mul"])
     assert lines[0]["face +0 lost"] == "" and lines[-1]["face +0 lost"] == "0"
-    assert "slab-robust" in (tmp_path / "o" / "kernels.txt").read_text() and json.loads((tmp_path / "o" / "kernels.json").read_text())["rows"]
+    assert "slab-robust" in (out / "kernels.txt").read_text() and json.loads((out / "kernels.json").read_text())["rows"]
     assert main(["kernels", "--rays", "10", "--repeats", "1"]) == DONE
     assert re.search(r"^watertight +\S+ +\S+ +25 +27 +3 +6 +0$", capsys.readouterr().out, re.M)

@@ -5,8 +5,8 @@ exit (Kay and Kajiya, "Ray Tracing Complex Scenes", 1986). The rays' reciprocals
 is zero and the origin lies in a plane, 0 times infinity is NaN: that is where they differ. Decided as in the pure core,
 comparison by comparison, so that NaN does the same: numpy's own minimum would pass it on.
 
-A test takes pairs, ``test(rays, ray, lo, hi, t_far)``, with the boxes' corners as columns, shape (3, m), and `t_far` a number a ray;
-it returns t_in, t_out, and which pairs meet.
+A test takes pairs, ``test(rays, ray, lo, hi, t_far)``, with the boxes' corners as columns, shape (3, m), and `t_far` a
+number a ray; it returns t_in, t_out, and which pairs meet.
 """
 
 import numpy as np
@@ -49,14 +49,14 @@ def plain(rays, ray, lo, hi, t_far):
 
 
 def branchless(rays, ray, lo, hi, t_far):
-    """The least and the greatest of each two planes (Barnes 2011; Majercik et al. 2018); NaN in the second misses what is met."""
+    """The least and the greatest of each two planes (Barnes 2011; Majercik et al. 2018); NaN misses what is met."""
     with np.errstate(invalid="ignore", over="ignore"):
         planes = ((_least(a, b), _most(a, b)) for a, b, _ in _planes(rays, ray, lo, hi))
         return _between(planes, rays.t_min.take(ray), t_far.take(ray))
 
 
 def robust(rays, ray, lo, hi, t_far):
-    """Planes put in order by the direction's sign, NaN never taken, the far end 2 ulp further (Ize 2013); for t >= 0."""
+    """Planes put in order by the direction's sign, NaN never taken, far ends 2 ulp further (Ize 2013); for t >= 0."""
     with np.errstate(invalid="ignore", over="ignore"):
         def ordered():
             for a, b, inverse in _planes(rays, ray, lo, hi):

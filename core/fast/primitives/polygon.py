@@ -30,7 +30,7 @@ def triangles(placed):
 
 
 def _widest(line, x, n):
-    """Begins and widths of the widest stretches inside of n polygons, from where level lines cross edges; 0 where they cross none."""
+    """Begins and widths of the widest stretches inside of n polygons, from where level lines cross edges; 0 for none."""
     order = np.lexsort((x, line))
     line, x = line[order][::2], x[order]
     left, width = x[::2], x[1::2] - x[::2]
@@ -185,7 +185,7 @@ class Polygons:
         return line, np.arange(len(line)) + np.repeat(self.corners.start[item] - first, count), first
 
     def inscribed_box(self, item):
-        """Corners, shape (m, 8, 3), of flat boxes, each of four twice: large quadrilaterals within. NaN where there is no room.
+        """Corners, shape (m, 8, 3), of flat boxes, each of four twice: large quadrilaterals within; NaN without room.
 
         Along the plane's two axes it is a rectangle with the proportions of the polygon's box, grown around a point until it
         meets an edge: the best of those in the widest stretches inside at some heights. A trifle smaller, so that

@@ -12,7 +12,7 @@ from ...scene.layout import mirrors, to_world
 
 #: gamma(7): relative error of a point interpolated from three vertices (Pharr et al., PBR 4th ed., 6.8.5).
 GAMMA_7 = 7 * 2.0**-53 / (1 - 7 * 2.0**-53)
-#: How far inscribed boxes stay away from edges, relative to the coordinates (8 for the difference between components and lengths).
+#: How far inscribed boxes stay away from edges, relative to the coordinates; 8 makes up for components instead of lengths.
 TRIM = 8 * 2.0**-40
 
 
@@ -171,8 +171,9 @@ class Triangles:
         return self.xyz[:, item].T.reshape(-1, 3, 3)
 
     def inscribed_box(self, item):
-        """Corners, shape (m, 8, 3), of flat boxes, each of four twice: the largest parallelograms within, half the triangles. NaN where there is no room.
+        """Corners, shape (m, 8, 3), of flat boxes, each of four twice: the largest parallelograms within.
 
+        They are half the triangles; NaN where there is no room.
         A trifle smaller, so that rounding does not put a corner outside: seen at any angle that is not nearly edge-on, what
         passes through one meets the triangle.
         """

@@ -4,8 +4,8 @@ They divide the work differently between the triangle (once), and the ray and th
 watertight: a ray through an edge or a vertex that triangles share may miss all of them. Calculated as in the pure core,
 operation by operation, so that not a bit differs.
 
-A test takes pairs: ``test(rays, ray, corners, data)``, the corners' nine rows and the prepared ones for each pair, and returns
-t, u, v (weights of the second and the third vertex) and which pairs meet, anywhere on the line.
+A test takes pairs: ``test(rays, ray, corners, data)``, the corners' nine rows and the prepared ones for each pair, and
+returns t, u, v (weights of the second and the third vertex) and which pairs meet, anywhere on the line.
 """
 
 import numpy as np
@@ -49,7 +49,7 @@ def nothing(a, b, c):
 
 
 def moller_trumbore(rays, ray, corners, data):
-    """Möller and Trumbore, "Fast, Minimum Storage Ray/Triangle Intersection", 1997: Cramer's rule, nothing prepared."""
+    """Cramer's rule, nothing prepared: Möller and Trumbore, "Fast, Minimum Storage Ray/Triangle Intersection", 1997."""
     o, d = _of(rays.o, ray), _of(rays.d, ray)
     a, b, c = corners[0:3], corners[3:6], corners[6:9]
     e, f = _sub(b, a), _sub(c, a)
@@ -70,7 +70,8 @@ def plane(a, b, c):
 
 
 def badouel(rays, ray, corners, data):
-    """Badouel, "An Efficient Ray-Polygon Intersection", Graphics Gems, 1990: the plane, then two unknowns in the projection along an axis."""
+    """The plane, then two unknowns in the projection along an axis: Badouel, "An Efficient Ray-Polygon Intersection",
+    Graphics Gems, 1990."""
     k, *n, offset = data
     along = _dot(n, _of(rays.d, ray))
     t = (offset - _dot(n, _of(rays.o, ray))) / along
@@ -86,8 +87,8 @@ def badouel(rays, ray, corners, data):
 
 
 def transform(a, b, c):
-    """For Baldwin and Weber's test: the normal's longest axis, and three rows of three that take points to u, v and the height above
-    the plane. The fourth number of each row is known: 0, 0 and 1."""
+    """For Baldwin and Weber's test: the normal's longest axis, and three rows of three that take points to the height
+    above the plane, u and v. The fourth number of each row is known: 1, 0 and 0."""
     e, f, n, k = _normal(a, b, c)
     i, j = (k + 1) % 3, (k + 2) % 3
     pick = lambda axis, of: np.choose(axis, of)
@@ -100,7 +101,8 @@ def transform(a, b, c):
 
 
 def baldwin_weber(rays, ray, corners, data):
-    """Baldwin and Weber, "Fast Ray-Triangle Intersections by Coordinate Transformation", 2016: the ray where the triangle is the unit triangle."""
+    """The ray in the space where the triangle is the unit triangle: Baldwin and Weber, "Fast Ray-Triangle Intersections
+    by Coordinate Transformation", 2016."""
     k, ni, nj, n0, ui, uj, u0, vi, vj, v0 = data
     axes = [(k + 1) % 3, (k + 2) % 3, k]
     (oi, oj, ok), (di, dj, dk) = _along(rays.o, axes, ray), _along(rays.d, axes, ray)
@@ -120,7 +122,7 @@ def edge_lines(a, b, c):
 
 
 def plucker(rays, ray, corners, data):
-    """Erickson, "Pluecker Coordinates", Ray Tracing News 10(3), 1997: on which side the ray passes each edge."""
+    """On which side the ray passes each edge: Erickson, "Pluecker Coordinates", Ray Tracing News 10(3), 1997."""
     o, d, m = _of(rays.o, ray), _of(rays.d, ray), _of(rays.moment, ray)
     w, u, v = (_dot(d, data[k + 3:k + 6]) + _dot(m, data[k:k + 3]) for k in (0, 6, 12))
     one_side = ((u >= 0.0) & (v >= 0.0) & (w >= 0.0)) | ((u <= 0.0) & (v <= 0.0) & (w <= 0.0))
@@ -129,8 +131,8 @@ def plucker(rays, ray, corners, data):
 
 
 #: Name -> (what is calculated for triangles beforehand, the test). The watertight test is Triangles' own.
-TESTS = {"moller-trumbore": (nothing, moller_trumbore), "badouel": (plane, badouel), "baldwin-weber": (transform, baldwin_weber),
-         "plucker": (edge_lines, plucker)}
+TESTS = {"moller-trumbore": (nothing, moller_trumbore), "badouel": (plane, badouel),
+         "baldwin-weber": (transform, baldwin_weber), "plucker": (edge_lines, plucker)}
 
 
 class Tested(Triangles):

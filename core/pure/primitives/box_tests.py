@@ -12,7 +12,8 @@ EPSILON = 2.0**-52
 def plain(ray, lo, hi, t_far):
     """Planes put in order by comparing, leaving as soon as it is missed (Kay and Kajiya 1986).
 
-    With a direction of -0 in a plane of the box nothing is swapped, as nothing compares with NaN: a box that is met is missed.
+    With a direction of -0 in a plane of the box nothing is swapped, as nothing compares with NaN: a box that is met is
+    missed.
 
     Operations: 6 multiplications, 6 additions, 0 divisions, 12 comparisons.
 
@@ -42,8 +43,8 @@ def plain(ray, lo, hi, t_far):
 
 
 def branchless(ray, lo, hi, t_far):
-    """Least and greatest of all planes, one decision at the end (Barnes, "Fast, Branchless Ray/Bounding Box Intersections", 2011;
-    Majercik et al. 2018).
+    """Least and greatest of all planes, one decision at the end (Barnes, "Fast, Branchless Ray/Bounding Box
+    Intersections", 2011; Majercik et al. 2018).
 
     In the upper plane of a box the second number is NaN and the first is taken for both: a box that is met is missed.
 
@@ -61,7 +62,8 @@ def branchless(ray, lo, hi, t_far):
 
 
 def robust(ray, lo, hi, t_far):
-    """Planes put in order by the direction's sign, NaN never taken, the far end 2 ulp further (Ize, "Robust BVH Ray Traversal", 2013).
+    """Planes put in order by the direction's sign, NaN never taken, the far end 2 ulp further (Ize, "Robust BVH Ray
+    Traversal", 2013).
 
     Never misses a box that the ray meets at some t >= 0, were it in one point.
 

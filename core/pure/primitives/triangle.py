@@ -15,7 +15,7 @@ from . import Primitive
 ROUNDING = 2.0**-53
 #: gamma(7): relative error of a point interpolated from three vertices (Pharr et al., PBR 4th ed., 6.8.5).
 GAMMA_7 = 7 * ROUNDING / (1 - 7 * ROUNDING)
-#: How far inscribed boxes stay away from edges, relative to the coordinates (8 for the difference between components and lengths).
+#: How far inscribed boxes stay away from edges, relative to the coordinates; 8 makes up for components instead of lengths.
 TRIM = 8 * 2.0**-40
 
 
@@ -131,8 +131,9 @@ class Triangle(Primitive):
         return [self.a, self.b, self.c]
 
     def inscribed_box(self):
-        """The 8 corners of a flat box, each of four twice: the largest parallelogram within, half the triangle. None where there is no room.
+        """The 8 corners of a flat box, each of four twice: the largest parallelogram within, half the triangle.
 
+        None where there is no room.
         A trifle smaller, so that rounding does not put a corner outside: seen at any angle that is not nearly edge-on, what
         passes through it meets the triangle.
         """

@@ -74,8 +74,8 @@ def plane(a, b, c):
 
 
 def badouel(ray, triangle):
-    """Where the ray meets the plane, then two unknowns in the projection along an axis: Badouel, "An Efficient Ray-Polygon
-    Intersection", Graphics Gems, 1990.
+    """Where the ray meets the plane, then two unknowns in the projection along an axis: Badouel, "An Efficient
+    Ray-Polygon Intersection", Graphics Gems, 1990.
 
     Operations: 13 multiplications, 17 additions, 3 divisions, 8 comparisons.
 
@@ -101,8 +101,8 @@ def badouel(ray, triangle):
 
 
 def transform(a, b, c):
-    """For Baldwin and Weber's test: the normal's longest axis, and three rows of three that take points to u, v and the height above
-    the plane. The fourth number of each row is known: 0, 0 and 1."""
+    """For Baldwin and Weber's test: the normal's longest axis, and three rows of three that take points to the height
+    above the plane, u and v. The fourth number of each row is known: 1, 0 and 0."""
     e, f, n, k = _normal(a, b, c)
     i, j = (k + 1) % 3, (k + 2) % 3
     size = n[k] if n[k] else math.nan                   # without area: never hit
@@ -113,8 +113,8 @@ def transform(a, b, c):
 
 
 def baldwin_weber(ray, triangle):
-    """The ray in the space where the triangle is the unit triangle: Baldwin and Weber, "Fast Ray-Triangle Intersections by
-    Coordinate Transformation", 2016.
+    """The ray in the space where the triangle is the unit triangle: Baldwin and Weber, "Fast Ray-Triangle
+    Intersections by Coordinate Transformation", 2016.
 
     Operations: 10 multiplications, 12 additions, 1 division, 6 comparisons.
 
@@ -146,10 +146,11 @@ def _side(d, m, e, g):
 
 
 def plucker(ray, triangle):
-    """On which side the ray passes each edge, in Plücker coordinates: Erickson, "Pluecker Coordinates", Ray Tracing News 10(3), 1997;
-    Shevtsov et al. 2007 compare it.
+    """On which side the ray passes each edge, in Plücker coordinates: Erickson, "Pluecker Coordinates", Ray Tracing
+    News 10(3), 1997.
 
-    Neighbours agree on the sign at the edge they share, to the bit; around a vertex the signs may contradict each other.
+    Neighbours agree on the sign at the edge they share, to the bit; around a vertex the signs may contradict each
+    other.
 
     Operations: 21 multiplications, 20 additions, 3 divisions, 7 comparisons.
 
@@ -168,8 +169,8 @@ def plucker(ray, triangle):
 
 
 #: Name -> (what is calculated for a triangle beforehand, the test). The watertight test is Triangle's own.
-TESTS = {"moller-trumbore": (nothing, moller_trumbore), "badouel": (plane, badouel), "baldwin-weber": (transform, baldwin_weber),
-         "plucker": (edge_lines, plucker)}
+TESTS = {"moller-trumbore": (nothing, moller_trumbore), "badouel": (plane, badouel),
+         "baldwin-weber": (transform, baldwin_weber), "plucker": (edge_lines, plucker)}
 
 
 class Tested(Triangle):
