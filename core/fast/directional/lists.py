@@ -91,6 +91,10 @@ class Lists:
         if self.grid is None:
             return
         cell = self.grid.cell(u, v)
+        # Cell by cell: neighbours look at the same entries, which are then at hand.
+        key = np.sort(cell << 32 | np.arange(len(cell)))
+        cell, order = key >> 32, key & 0xFFFFFFFF
+        ray, u, v, nearness = (c.take(order) for c in (ray, u, v, nearness))
         cursor, end = self.start.take(cell), self.start.take(cell + 1)
         if query.counts:
             query.counts.steps(ray)
