@@ -34,14 +34,16 @@ def write_scene(scene, context):
     bpy.types.Collection
         Holds all that was made.
     """
-    collection = bpy.data.collections.new(scene.name)
+    collection, sources = bpy.data.collections.new(scene.name), bpy.data.collections.new(f"{scene.name}: stand-ins")
     context.scene.collection.children.link(collection)
+    collection.children.link(sources)
+    # Only instances are seen. (Were the objects hidden, the viewport would hide their instances too.)
+    context.view_layer.layer_collection.children[collection.name].children[sources.name].exclude = True
     for obj in scene.objects:
         materials = [_material(m) for m in obj.materials]
         for (kind, capped, ratio, slot), matrices in _groups(obj).items():
-            _instances(
-                collection, kind, {"capped": capped, "ratio": ratio}, materials[min(slot, len(materials) - 1)], matrices
-            )
+            material = materials[min(slot, len(materials) - 1)]
+            _instances(collection, sources, kind, {"capped": capped, "ratio": ratio}, material, matrices)
         for smooth in (False, True):
             _polygons(collection, obj, smooth, materials)
     lo, hi = scene.bounds()
@@ -70,14 +72,13 @@ def _groups(obj):
     return groups
 
 
-def _instances(collection, kind, values, material, matrices):
+def _instances(collection, sources, kind, values, material, matrices):
     """One tagged stand-in, and the points that place it."""
     name = f"{kind.title()} {material.name}"
     mesh = stand_in(kind, segments=SEGMENTS, **values)
     mesh.materials.append(material)
-    source = _link(collection, name, mesh)
+    source = _link(sources, name, mesh)
     source.rayscope.capped, source.rayscope.ratio, source.rayscope.kind = values["capped"], values["ratio"], kind
-    source.hide_render = source.hide_viewport = True  # only its instances are seen
     points = bpy.data.meshes.new(f"{name} places")
     points.vertices.add(len(matrices))
     columns = np.swapaxes(np.array(matrices), 1, 2).astype(np.float32)
