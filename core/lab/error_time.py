@@ -150,6 +150,7 @@ class _Sweep:
         # In samples a pixel: for the progress.
         work = [self._work(s, finest) for s in settings]
         self.total = FINER * finest + (1.5 + REPEATS) * sum(work)
+        self.say(f"paths are followed to depth {self.full['depth']}; a sample of all pixels takes {cost:.2g} s")
         self.say(f"{len(settings)} settings up to {finest} samples a pixel; reference with {FINER * finest}")
         halves = [
             self._traced({**self.full, "samples": FINER * finest // 2}, self.seed + 1 + k, work=FINER * finest / 2)

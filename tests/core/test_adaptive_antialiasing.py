@@ -232,3 +232,25 @@ def test_shadow_rays_to_a_light_count_and_smooth():
     }
     noise = {n: math.sqrt(np.mean(images.var(axis=0))) for n, images in runs.items()}
     assert 0.35 < noise[16] / noise[4] < 0.7
+
+
+def test_the_command_takes_them(tmp_path, capsys):
+    import json
+
+    from rayscope.core.command import main
+
+    nff = tmp_path / "scene.nff"
+    nff.write_text(
+        "v\nfrom 0 -6 3\nat 0 0 0.6\nup 0 0 1\nangle 40\nhither 0.1\nresolution 16 12\nb 0.2 0.3 0.5\nl 3 -3 4\n"
+        "f 0.8 0.6 0.4 0.7 0.3 10 0 1\ns 0 0 0.7 0.7\ns 1 0 0.5 0.3\n"
+    )
+    call = ["trace", str(nff), "--size", "12x9", "--threshold", "0.2", "--antialiasing", "corners", "--aa-level", "1"]
+    assert main([*call, "--aa-threshold", "0.2", "--light-samples", "2", "--json"]) == 0
+    printed = json.loads(capsys.readouterr().out)
+    assert printed["parameters"]["antialiasing"] == "corners" and printed["parameters"]["light_samples"] == 2
+    assert 13 * 10 <= printed["figures"]["primary"]["rays"] < 25 * 19
+    assert printed["figures"]["reflected"]["saved"] > 0
+    assert main([*call, "--roulette"]) == 0
+    assert "saved" in capsys.readouterr().out
+    assert main([*call, "--aa-level", "0"]) == 2
+    assert "aa_level" in capsys.readouterr().err
