@@ -328,7 +328,8 @@ def grazing(scene, rng, n):
     side = np.cross(e, rng.normal(size=e.shape))
     length = np.linalg.norm(e, axis=1, keepdims=True)
     d = e / length + math.tan(math.radians(0.5)) * side / np.linalg.norm(side, axis=1, keepdims=True)
-    at = pick[:, 0] + rng.random((n, 1)) * e
+    weight = rng.random((n, 3))
+    at = (pick * (weight / weight.sum(axis=1, keepdims=True))[..., None]).sum(axis=1)
     at[::2] += 1e-3 * length[::2] * rng.normal(size=at[::2].shape)
     return Batch(at - 2.0 * length * d, d)
 
