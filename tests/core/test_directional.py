@@ -9,8 +9,8 @@ from rayscope.core.scene.camera import Camera
 from rayscope.core.scene.light import Light
 from rayscope.core.scene.scene import Object, Shapes
 
-from .datasets import DATASETS, jittered_sphere, points_of, rays_for
-from .test_properties import BY_NAME, answers, assert_same_hits, index_of as any_index, reference, scene_of
+from .datasets import jittered_sphere, points_of
+from .test_properties import BY_NAME, answers, assert_same_hits, reference, scene_of
 
 CORES = ("pure", "fast")
 CAMERAS = {
@@ -68,7 +68,7 @@ def in_turn(kinds, each):
 
 
 @pytest.mark.parametrize("core", CORES)
-@pytest.mark.parametrize("name, view", in_turn(CAMERAS, 3))
+@pytest.mark.parametrize("name, view", in_turn(CAMERAS, 2))
 def test_camera_rays(name, view, core):
     scene, index, brute = viewed(name, view, core)
     size = (23, 17) if core == "fast" else (9, 7)
@@ -211,7 +211,7 @@ DIAGONALS = np.array([(x, y, z) for x in (-1, 0, 1) for y in (-1, 0, 1) for z in
 
 
 @pytest.mark.parametrize("core", CORES)
-@pytest.mark.parametrize("name, kind", in_turn(LIGHTS, 3))
+@pytest.mark.parametrize("name, kind", in_turn(LIGHTS, 2))
 def test_shadow_rays(name, kind, core):
     light, index, brute, o, d = lit(name, kind, core)
     far = math.inf if light.kind == "sun" else 1.0 - 1e-12

@@ -5,8 +5,6 @@ that origin. The sun has one parallel grid. Rays that go to no light, to a light
 are handed over.
 """
 
-import math
-
 import numpy as np
 
 from ...errors import Notice

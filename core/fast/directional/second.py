@@ -1,7 +1,5 @@
 """Handing over: what directional techniques do with rays that they were not made for."""
 
-import numpy as np
-
 from ...catalogue import technique
 from ...errors import Notice
 from ...parameters import resolve
