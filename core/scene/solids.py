@@ -59,6 +59,8 @@ KINDS = {k.name: k for k in (
 SINGULAR = 1e-12
 #: A polygon whose corners are further from its plane than this, relative to its size, is not planar.
 NOT_PLANAR = 1e-4
+#: The same, relative to the largest coordinate, below which it is but rounding.
+ROUNDED_OFF = 2.0**-48
 
 
 @dataclass
@@ -415,6 +417,8 @@ class Corners:
     normal, anchor : ndarray, shape (3, n)
         Planes: unit normals by Newell's method, which follow the winding whatever corner comes first (0 for polygons
         without area), turned round where the matrix mirrors; and the mean of the corners.
+    off, size : ndarray, shape (n,)
+        How far the corners given lie off the planes at most, and the polygons' sizes.
     """
 
     start: np.ndarray
@@ -422,6 +426,8 @@ class Corners:
     following: np.ndarray
     normal: np.ndarray
     anchor: np.ndarray
+    off: np.ndarray
+    size: np.ndarray
 
     @classmethod
     def of(cls, placed):
@@ -447,19 +453,18 @@ class Corners:
         # A long thin polygon's area is small, but nothing like the rounding of its products.
         flat = ~(length > 64 * 2.0**-53 * count)
         mirror = np.where(placed.mirrors(), -1.0, 1.0)
-        return cls(start, xyz, following, np.where(flat, 0.0, normal / np.where(flat, 1.0, length) * mirror), anchor)
-
-    def off_plane(self):
-        """How far the corners lie off the planes at most, and the polygons' sizes."""
-        owner = np.repeat(np.arange(len(self.start) - 1), np.diff(self.start))
-        p, first = self.xyz - self.anchor[:, owner], self.start[:-1]
-        off = np.maximum.reduceat(np.abs((p * self.normal[:, owner]).sum(axis=0)), first)
-        return off, np.maximum.reduceat(np.abs(p).max(axis=0), first)
+        normal = np.where(flat, 0.0, normal / np.where(flat, 1.0, length) * mirror)
+        away = ((xyz - anchor[:, owner]) * normal[:, owner]).sum(axis=0)
+        off = np.maximum.reduceat(np.abs(away), first)
+        # A ray meets the plane: corners beside it would make boxes that miss its hits. Corners off by rounding alone stay
+        # as they are, or neighbours would no longer share them.
+        rounding = ROUNDED_OFF * np.maximum.reduceat(np.abs(xyz).max(axis=0), first)
+        xyz = xyz - np.where(off > rounding, 1.0, 0.0)[owner] * away * normal[:, owner]
+        return cls(start, xyz, following, normal, anchor, off, scale)
 
     def planar(self):
         """Bool per polygon: whether it has an area, in one plane."""
-        off, size = self.off_plane()
-        return self.normal.any(axis=0) & (off <= NOT_PLANAR * size)
+        return self.normal.any(axis=0) & (self.off <= NOT_PLANAR * self.size)
 
 
 def faults(objects):
@@ -512,7 +517,7 @@ def _polygon_fault(placed, at):
     corners = Corners.of(placed)
     if not corners.normal[:, at].any():
         return "its corners lie on one line, or its matrix puts them there"
-    off, size = (float(x[at]) for x in corners.off_plane())
+    off, size = float(corners.off[at]), float(corners.size[at])
     return f"it is not planar: a corner is {off:.3g} off its plane ({off / size:.1%} of its size); divide it into triangles"
 
 

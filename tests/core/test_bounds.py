@@ -243,3 +243,17 @@ def test_predicted_probabilities_are_those_of_random_lines():
         rel, worst = (0.15, 0.1) if name in ("sphere-tree", "obb-tree") else (0.03, 0.015)
         for row in rows:
             assert row["p"] == pytest.approx(row["p_predicted"], rel=rel, abs=0.003) and row["worst"] < worst, name
+
+
+def test_hits_of_a_polygon_not_quite_planar_are_in_its_box():
+    rng = np.random.default_rng(5)
+    angle = np.sort(rng.uniform(0.0, 2.0 * np.pi, 9))
+    points = np.stack([np.cos(angle), np.sin(angle), rng.uniform(-2e-5, 2e-5, 9)], axis=1)
+    scene = Scene(solids=[solids.polygon(points)])
+    grazing = np.stack([rng.uniform(-2.0, 2.0, 400), rng.uniform(-2.0, 2.0, 400), rng.uniform(-0.01, 0.01, 400)], axis=1)
+    target = np.stack([*rng.uniform(-0.7, 0.7, (2, 400)), np.zeros(400)], axis=1)
+    for core in ("pure", "fast"):
+        expected = build(scene, "brute", core).closest(grazing, target - grazing)
+        assert 100 < np.count_nonzero(np.asarray(expected.primitive) >= 0)
+        for name in ("bvh", "grid", "octree", "kdop-tree"):
+            assert np.array_equal(build(scene, name, core).closest(grazing, target - grazing).primitive, expected.primitive), (name, core)

@@ -187,8 +187,6 @@ def _margins(primitives):
             slack[some] *= forth * back
         if own.KIND == "triangle":
             stretch[some], reach[some] = _slivers(own.xyz)
-        elif own.KIND == "polygon":
-            slack[some] += own.corners.off_plane()[0]   # hits lie on the plane, corners need not
         elif own.KIND == "instance":
             inner = np.array([[a.max() for a in _slivers(s.primitives.kinds[0].xyz)] for s in own.structures]).reshape(-1, 2)[own.which]
             stretch[some], reach[some] = inner[:, 0] * forth * back, inner[:, 1] * forth

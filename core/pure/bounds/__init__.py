@@ -128,9 +128,6 @@ def margin_of(primitive):
         slack *= forth * back
     if primitive.KIND == "triangle":
         stretch, reach = _sliver(primitive)
-    elif primitive.KIND == "polygon":
-        # Hits lie on the plane, corners need not.
-        slack += max(abs(sum((x - y) * z for x, y, z in zip(p, primitive.anchor, primitive.normal))) for p in primitive.corners)
     elif primitive.KIND == "instance":
         stretch, reach = map(max, zip(*map(_sliver, primitive.inner.primitives)))
         stretch, reach = stretch * forth * back, reach * forth
