@@ -160,3 +160,13 @@ def test_import_is_quick():
     code = "import numpy, time; t = time.process_time(); import rayscope.core; print(time.process_time() - t)"
     times = [float(subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout) for _ in range(2)]
     assert min(times) < 0.1
+
+
+def test_survey_of_solids():
+    rng = np.random.default_rng(0)
+    corners = rng.random((500, 1, 3)) + 0.01 * rng.normal(size=(500, 3, 3))
+    polygons = [solids.polygon(c) for c in corners]
+    seen = needs.survey(Scene(solids=polygons))
+    assert seen.kinds == {polygons[0].kind: 500} and seen.clutter < 5.0 and 1.0 < seen.size < 2.0
+    cut = solids.difference(solids.box((0, 0, 0), (1, 1, 1)), solids.sphere((5, 5, 5), 1.0))
+    assert needs.survey(Scene(solids=[cut] * 3)).kinds == {"csg": 3}
