@@ -28,12 +28,12 @@ SAMPLE = 2000
 #: Solids whose boxes are looked at, at most, about: one takes as long as a hundred vertices.
 FEW = 100
 #: Scenes that the model is fitted on: number of primitives, and whether they are spread unevenly.
-SCENES = {"fast": ((50, False), (1000, False), (300, True)), "pure": ((16, False), (150, False), (60, True))}
+SCENES = {"fast": ((40, False), (700, False), (250, True)), "pure": ((16, False), (150, False), (60, True))}
 #: Rays of each kind: numpy's calls cost the same for few rays as for many, so the seconds of a ray are those by which
 #: more rays take longer than fewer.
-RAYS = {"fast": (3000, 150), "pure": (40, 8)}
+RAYS = {"fast": (2000, 100), "pure": (40, 8)}
 #: A batch with more tests than this is not run: the smaller one has to do.
-TESTS = 160_000
+TESTS = 90_000
 #: A technique whose time per ray is wrong by more than this factor on a scene that it was fitted on is no candidate:
 #: its time does not follow from its counters.
 TRUST = 3.0
