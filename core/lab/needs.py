@@ -47,7 +47,7 @@ HOPELESS = 8.0
 #: Databases of :func:`benchmark`, with size factors that give some hundred primitives.
 DATABASES = {"balls": 2, "gears": 1, "jacks": 2, "lattice": 4, "mount": 4, "rings": 2, "teapot": 5, "tetra": 5, "tree": 7}
 #: Calibrated first: brute force tells what a test costs, which is the same for all.
-FIRST = ("brute", STANDARD, "kd-tree", "grid", "octree")
+FIRST = ("brute", STANDARD, "grid", "octree", "kd-tree")
 #: Bytes of a triangle in a structure, about: what copies of instances would take.
 TRIANGLE_BYTES = 250
 
