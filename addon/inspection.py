@@ -1,9 +1,9 @@
-"""Inspecting Blender's scenes: the task, and what was found. Names and numbers only: no reference into Blender's data."""
+"""Inspecting Blender's scenes: the task, and what was found. Names and numbers only: no reference into Blender's data.
 
-from .read import read_scene
-from .tasks import picture_size
+Panels look here at every redraw, so numpy and the core load on first use, not with the add-on.
+"""
+
 from ..core.errors import SceneError
-from ..core.lab.estimate import estimate
 
 #: Larger scenes are looked through for warnings only when they are inspected: it takes a while.
 AT_EACH_BUILD = 200_000
@@ -45,6 +45,9 @@ class Inspect:
     """
 
     def __init__(self, depsgraph):
+        from .read import read_scene
+        from .tasks import picture_size
+        from ..core.lab.estimate import estimate
         scene, settings = depsgraph.scene, depsgraph.scene.rayscope
         self.uid, self.size, self.depth = scene.session_uid, picture_size(scene), settings.depth
         self.scene = read_scene(depsgraph, for_render=True, size=self.size)

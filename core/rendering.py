@@ -4,7 +4,6 @@ Pictures are arrays whose row 0 is at the bottom, as in Blender.
 """
 
 import math
-import os
 import time
 from dataclasses import dataclass, field
 from importlib import import_module
@@ -14,6 +13,7 @@ import numpy as np
 from .catalogue import CORES, build, technique as technique_row
 from .errors import Cancelled, MemoryEstimateError, Notice, ParameterError, SceneError
 from .figures import PER_RAY, ray_figures
+from .memory import free_memory
 from .options import PARAMETERS
 from .parameters import resolve
 from .scene.camera import check_size
@@ -457,7 +457,7 @@ def _framebuffer(size, names):
     """The passes, empty."""
     width, height = size
     need = width * height * sum(PASSES[n][0] * np.dtype(PASSES[n][1]).itemsize for n in names)
-    there = _memory()
+    there = free_memory()
     if need > 0.75 * there:
         raise MemoryEstimateError(
             f"Picture of {width} x {height} pixels: its passes would take {need / 2**30:.1f} GiB of the "
@@ -467,14 +467,6 @@ def _framebuffer(size, names):
         name: np.full((height, width) if k == 1 else (height, width, k), empty, dtype)
         for name, (k, dtype, empty) in ((n, PASSES[n]) for n in names)
     }
-
-
-def _memory():
-    """Bytes of memory that there are, or infinity where the system does not tell."""
-    try:
-        return os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
-    except (AttributeError, ValueError, OSError):
-        return math.inf
 
 
 def _notices(scene):

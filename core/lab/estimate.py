@@ -7,12 +7,12 @@ speed differs less between machines and versions of Python, is not.
 """
 
 import math
-import os
 import time
 from dataclasses import dataclass
 
 from ..catalogue import technique as row_of
 from ..errors import MemoryEstimateError
+from ..memory import free_memory
 
 #: Seconds of the reference loop on the machine where the constants were measured.
 MACHINE = 1.5e-3
@@ -98,7 +98,7 @@ class Estimate:
     def check_memory(self):
         """Raise a MemoryEstimateError if there is less memory than it needs."""
         free = free_memory()
-        if free is not None and self.bytes > free:
+        if self.bytes > free:
             raise MemoryEstimateError(
                 f"About {self.bytes / 1e9:.1f} GB of memory would be needed for {self.primitives:,} primitives and {self.rays:,} rays, but "
                 f"{free / 1e9:.1f} GB are free: use fewer primitives, a coarser structure or a smaller picture.")
@@ -157,19 +157,6 @@ def machine_seconds():
             x = x * 0.5 + i
         best = min(best, time.perf_counter() - start)
     return best
-
-
-def free_memory():
-    """Bytes that could be allocated now, or None where the system does not tell."""
-    try:
-        with open("/proc/meminfo") as file:
-            return next(int(line.split()[1]) * 1024 for line in file if line.startswith("MemAvailable:"))
-    except (OSError, StopIteration):
-        pass
-    try:
-        return os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
-    except (AttributeError, ValueError, OSError):
-        return None
 
 
 def duration(seconds):

@@ -427,7 +427,7 @@ def test_what_cannot_be_done_is_said():
         (ParameterError, "whole number", {"samples": 1.5}),
         (ParameterError, "seed", {"seed": "x"}),
         (ParameterError, "did you mean 'bvh'", {"technique": "bhv"}),
-        (ParameterError, "Techniques: ", {"shadow": "automatic"}),
+        (ParameterError, "Techniques: ", {"shadow": "automatical"}),
         (ParameterError, "fast, pure|pure, fast", {"core": "gpu"}),
         (ParameterError, "has no core", {"technique": "embree", "core": "pure"}),
         (ParameterError, "no parameter 'leafs'", {"parameters": {"leafs": 1}}),
@@ -438,7 +438,7 @@ def test_what_cannot_be_done_is_said():
 
 
 def test_a_gigantic_picture_is_refused_before_memory_is_taken(monkeypatch):
-    monkeypatch.setattr("rayscope.core.rendering._memory", lambda: 2**30)
+    monkeypatch.setattr("rayscope.core.rendering.free_memory", lambda: 2**30)
     with pytest.raises(MemoryEstimateError, match="30000 x 30000"):
         trace(simple(), size=(30_000, 30_000))
 
