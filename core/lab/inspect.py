@@ -333,7 +333,7 @@ def _clustered(corners, edge):
 def teapot_in_a_stadium(scene, ledger, corners, technique, total, **_):
     """A tiny detailed object in a huge scene: cells of one size are too large for one and too small for the other."""
     boxes = {k: box_of(own) for k, own in enumerate(corners) if len(own)}
-    if len(boxes) < 2:
+    if len(boxes) < 2 or not ("grid" in technique or technique == "octree"):    # a tree of boxes does not mind
         return
     lo, hi = np.min([b[0] for b in boxes.values()], axis=0), np.max([b[1] for b in boxes.values()], axis=0)
     whole = float(np.linalg.norm(hi - lo)) or 1.0
@@ -341,11 +341,10 @@ def teapot_in_a_stadium(scene, ledger, corners, technique, total, **_):
     for k, (a, b) in boxes.items():
         part = float(np.linalg.norm(b - a)) / whole
         if part < 0.02 and len(corners[k]) > 0.2 * n and len(corners[k]) > 200:
-            cells = "grid" in technique or technique == "octree"
             yield Finding([scene.objects[k].name], "tiny and detailed", f"it has {len(corners[k]) / n:.0%} of the triangles in {part:.2%} of the scene's length; "
                           f"{ledger.tests[k] / max(total, 1):.0%} of the tests are made on it",
                           "Choose the technique Bounding Volume Hierarchy; or make the large surroundings smaller.", 1.0 / max(part, 1e-9),
-                          apply=(lambda scene: (scene, "bvh")) if cells else None)
+                          apply=lambda scene: (scene, "bvh"))
 
 
 def overlapping(scene, ledger, corners, total, **_):
@@ -354,8 +353,9 @@ def overlapping(scene, ledger, corners, total, **_):
     for a, b in itertools.combinations(costly, 2):
         (alo, ahi), (blo, bhi) = box_of(corners[a]), box_of(corners[b])
         common = np.minimum(ahi, bhi) - np.maximum(alo, blo)
-        smaller = min(np.ptp([alo, ahi], axis=0).prod(), np.ptp([blo, bhi], axis=0).prod())
-        if (common <= 0.0).any() or smaller <= 0.0 or common.prod() < 0.5 * smaller:
+        smaller, larger = sorted((np.ptp([alo, ahi], axis=0).prod(), np.ptp([blo, bhi], axis=0).prod()))
+        # A room around a table is no overlap that could be helped.
+        if (common <= 0.0).any() or smaller <= 0.1 * larger or common.prod() < 0.5 * smaller:
             continue
         wasted = [1.0 - ledger.hits[k] / max(ledger.tests[k], 1) for k in (a, b)]
         if max(wasted) < 0.5:
