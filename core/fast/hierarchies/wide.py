@@ -12,6 +12,7 @@ three roundings). A box is therefore never missed, and no epsilon depends on the
 
 import numpy as np
 
+from .packets import descend
 from .tree import half_area
 
 #: In unit space: 2**-24 for the origin, 2 x 3 x 2**-24 for the distance, doubled.
@@ -63,6 +64,10 @@ class WideTree:
         # Wide nodes are numbered in the order in which _collapse lists inner children.
         number[inner] = (1 + np.arange(int(inner.sum()))) * LINES
         table.view(np.int32)[:, CHILD] = np.where(empty, 0, number)
+
+    def children(self, node):
+        """Children's numbers, shape (n, 4), of nodes given by their first lines."""
+        return self.lines.take(node + CHILD).view(np.int32).reshape(-1, 4)
 
     @property
     def nbytes(self):
@@ -151,7 +156,12 @@ class _Octant:
         self.far = [a + 3 - 3 * s for a, s in enumerate(signs)]
         self.limit = unit.limit(query.t[index])
         self.limit4 = _four(self.limit)
-        self.levels = [[(alive, np.zeros(len(alive), np.int64), np.zeros(len(alive), np.float32))]] if len(alive) else []
+        # Counts are those of each ray by itself; what packets share would depend on the order of the rays.
+        if query.counts is None:
+            pairs = descend(tree, unit, self.near, self.far, self.limit, alive)
+        else:
+            pairs = alive, np.zeros(len(alive), np.int64), np.zeros(len(alive), np.float32)
+        self.levels = [[pairs]] if len(pairs[0]) else []
         self.leaf_ray, self.leaf_item, self.waiting = [], [], 0
 
     def run(self):
