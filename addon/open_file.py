@@ -1,5 +1,6 @@
 """Opens files in the `bpy` module (or a background Blender) for the command."""
 
+import atexit
 from pathlib import Path
 
 import bpy
@@ -69,6 +70,9 @@ def _know_settings():
         from .ui import primitives, properties
         properties.register()
         primitives.register_properties()
+        # bpy 4.5 never ends while classes with callbacks are registered.
+        atexit.register(primitives.unregister_properties)
+        atexit.register(properties.unregister)
 
 
 def open_scene(size=None):

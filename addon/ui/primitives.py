@@ -102,8 +102,12 @@ def register():
     bpy.utils.register_class(RAYSCOPE_OBJECT_PT_primitive)
 
 
+def unregister_properties():
+    del bpy.types.Object.rayscope
+    bpy.utils.unregister_class(RAYSCOPE_PG_primitive)
+
+
 def unregister():
     bpy.utils.unregister_class(RAYSCOPE_OBJECT_PT_primitive)
     bpy.utils.unregister_class(RAYSCOPE_PT_primitive)
-    del bpy.types.Object.rayscope
-    bpy.utils.unregister_class(RAYSCOPE_PG_primitive)
+    unregister_properties()

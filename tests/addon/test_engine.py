@@ -8,6 +8,7 @@ import exr
 import numpy as np
 import pytest
 from bl_ext.user_default.rayscope.addon import engine
+from bl_ext.user_default.rayscope.core import catalogue
 
 ENGINE = engine.ENGINE
 SIZE = 96, 64
@@ -164,6 +165,7 @@ def test_every_technique_makes_the_same_picture(scene, technique, core):
 def test_an_error_is_one_line(scene, monkeypatch, capfd):
     monkeypatch.setitem(sys.modules, "embreex", None)
     monkeypatch.setitem(sys.modules, "embreex.rtcore_scene", None)
+    monkeypatch.delitem(sys.modules, catalogue.__name__.replace("catalogue", "peers.embree"), raising=False)
     scene.rayscope.technique = "embree"
     text = ""
     try:
