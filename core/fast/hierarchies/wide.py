@@ -12,6 +12,7 @@ three roundings). A box is therefore never missed, and no epsilon depends on the
 
 import numpy as np
 
+from .build_ploc import spread
 from .packets import descend
 from .tree import half_area
 
@@ -98,7 +99,7 @@ def _collapse(tree):
 
 
 class UnitRays:
-    """Rays of one octant in unit space, four times over, starting where they enter the scene.
+    """Rays of one octant in unit space, four times over, starting where they enter the scene, in `order`.
 
     A component smaller than `TINY` is taken to be `TINY`: over the scene's extent that moves the ray by far less than
     `PAD`, and no reciprocal is infinite.
@@ -116,6 +117,8 @@ class UnitRays:
         self.end = far.min(axis=0)
         self.size = frame.size
         o += self.start * rays.d
+        order = self.order = along_curve(o)
+        o, inverse, self.start, self.end = o.take(order, axis=1), inverse.take(order, axis=1), self.start[order], self.end[order]
         #: Lines of x, y, z origins, then reciprocals; the far end is kept apart, since it changes.
         self.lines = [_four(a) for a in (*o, *inverse)]
 
@@ -123,6 +126,22 @@ class UnitRays:
         """Distances t of some rays as float32 distances from their starts, rounded up."""
         with np.errstate(over="ignore"):
             return ((t / self.size - self.start[ray]) * (1.0 + 2.0**-20) + 2.0**-40).astype(np.float32)
+
+
+def along_curve(o):
+    """Order of rays along a Morton curve through their origins, columns in [-1, 1].
+
+    Rays that start near each other meet the same nodes: those are then in the cache, and packets hold together.
+    """
+    code = np.zeros(o.shape[1], np.uint64)
+    for axis in range(3):
+        # fmin and fmax also take NaN, the origins of rays that come from too far away to meet anything, to a cell.
+        cell = np.fmin(np.fmax(o[axis] * 1023.5 + 1023.5, 0.0), 2047.0).astype(np.uint64)
+        code |= spread(cell) << np.uint64(2 - axis)
+    code <<= np.uint64(31)
+    code |= np.arange(o.shape[1], dtype=np.uint64)
+    code.sort()
+    return (code & np.uint64(2**31 - 1)).astype(np.int64)
 
 
 def _four(values):
@@ -149,6 +168,7 @@ class _Octant:
     def __init__(self, tree, frame, rays, query, index, octant):
         self.tree, self.query = tree, query
         unit = UnitRays(frame, rays.take(index))
+        index = index[unit.order]
         alive = np.flatnonzero((unit.start <= unit.end) & (unit.start * frame.size <= query.t[index]))
         self.index, self.unit = index, unit
         signs = [octant >> a & 1 for a in range(3)]
