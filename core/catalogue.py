@@ -38,6 +38,9 @@ class Technique:
         ``all``, or the only kind it takes.
     parameters : tuple of Parameter
     cores : tuple of str
+    tracer : str
+        Module and class, below each core, that makes pictures with it when it serves primary rays: Whitted's, unless the
+        technique traces something else than rays.
     """
 
     name: str
@@ -51,12 +54,22 @@ class Technique:
     primitives: str = "all"
     parameters: tuple = ()
     cores: tuple = CORES
+    tracer: str = "tracing.whitted.Whitted"
 
     def load(self, core):
         """Import the technique's module in one core and return its class."""
         folder = "peers" if self.family == "peers" else f"{core}.{self.family}"
-        module = import_module(f".{folder}.{self.module}", __package__)
-        return getattr(module, self.structure)
+        return _class(f"{folder}.{self.module}.{self.structure}")
+
+    def load_tracer(self, core):
+        """Import the tracer of pictures made with it in one core, and return its class."""
+        return _class(f"{core}.{self.tracer}")
+
+
+def _class(path):
+    """Import a class by its path below this package."""
+    module, _, name = path.rpartition(".")
+    return getattr(import_module(f".{module}", __package__), name)
 
 
 LEAF_SIZE = Parameter("leaf_size", 2, "A leaf holds at most this many primitives where it can be divided",

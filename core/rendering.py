@@ -264,7 +264,13 @@ class Rendering:
         passes = _framebuffer(self.size, names)
         self.result = Result(passes["combined"], passes, notices=_notices(scene))
         self._build(wanted, index)
-        tracer = import_module(f".{core}.tracing.whitted", __package__).Whitted
+        row = self.result.structures["primary"].technique
+        tracer = row.load_tracer(core)
+        if tracer.antialiases and (self.samples > 1 or antialiasing != "uniform"):
+            self.samples, antialiasing = 1, "uniform"
+            self.result.notices.append(
+                Notice(row.name, "each pixel is traced as a whole, once: samples and antialiasing were left aside.")
+            )
         self._tracer = tracer(
             scene,
             self.result.structures,
@@ -278,6 +284,7 @@ class Rendering:
             values["roulette"],
             values["light_samples"],
         )
+        self.result.notices += self._tracer.notices
         self._adaptive = None
         if antialiasing != "uniform":
             way = import_module(f".{core}.tracing.adaptive", __package__).WAYS[antialiasing]

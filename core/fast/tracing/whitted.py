@@ -100,9 +100,15 @@ class Whitted:
     ----------
     tally : dict
         Per kind of ray: rays, hits, n_it, n_ts, n_ets, n_eets, and saved: rays not traced for their small weight.
+    antialiases : bool
+        Whether one sample a pixel is the whole picture.
+    notices : sequence of Notice
+        What cannot be done as asked.
     """
 
     tile_side = TILE
+    antialiases = False
+    notices = ()
 
     def __init__(
         self,
@@ -168,38 +174,43 @@ class Whitted:
     def traced(self, o, d, key, first):
         """What primary rays see; `first`: with the passes of what they meet."""
         n = o.shape[1]
+        camera = self.scene.camera
+        wave = Wave(
+            o,
+            d,
+            np.full(n, float(camera.far)),
+            np.ones((3, n)),
+            np.arange(n),
+            np.zeros(n, np.int32),
+            np.full(n, PRIMARY, np.uint8),
+            key if self.soft or self.roulette else None,
+            t_min=float(camera.near),
+        )
+        return self.followed(wave, n, first)
+
+    def followed(self, wave, n, first):
+        """What a wave of primary rays, and all that come of it, add to n pixels; `first` as for :meth:`traced`."""
         self.radiance = np.zeros((3, n))
         self.per_pixel = {
             name: np.zeros(n, np.int64) for name in ("rays_per_pixel", *(("n_it", "n_ts") if self.count else ()))
         }
-        camera = self.scene.camera
-        stack = [
-            Wave(
-                o,
-                d,
-                np.full(n, float(camera.far)),
-                np.ones((3, n)),
-                np.arange(n),
-                np.zeros(n, np.int32),
-                np.full(n, PRIMARY, np.uint8),
-                key if self.soft or self.roulette else None,
-                t_min=float(camera.near),
-            )
-        ]
-        out = {}
+        stack, out = [wave], {}
         while stack:
-            wave = self._next(stack)
-            hits = self._closest(wave)
+            wave, hits = self._met(self._next(stack))
             met = np.flatnonzero(hits.primitive >= 0)
             surface = self.surfaces.at(hits, met, wave.d[:, met])
             if not out:
-                out = self._first(hits, met, surface) if first else {}
+                out = self._first(wave, hits, met, surface) if first else {}
                 out["combined"] = None
             self._shade(wave, hits, met, surface)
             stack += self._onward(wave, hits, met, surface)
         out["combined"] = self.radiance.T
         out.update(self.per_pixel)
         return out
+
+    def _met(self, wave):
+        """A wave as it goes on, and what each of its rays met."""
+        return wave, self._closest(wave)
 
     @staticmethod
     def _next(stack):
@@ -237,7 +248,7 @@ class Whitted:
             if name in self.per_pixel:
                 self.per_pixel[name] += np.bincount(pixel, values, minlength=n).astype(np.int64)
 
-    def _first(self, hits, met, surface):
+    def _first(self, wave, hits, met, surface):
         """The passes that show what the primary rays met."""
         normal = np.zeros((len(hits), 3))
         normal[met] = surface.shading.T

@@ -83,9 +83,15 @@ class Whitted:
     ----------
     tally : dict
         Per kind of ray: rays, hits, n_it, n_ts, n_ets, n_eets, and saved: rays not traced for their small weight.
+    antialiases : bool
+        Whether one sample a pixel is the whole picture.
+    notices : sequence of Notice
+        What cannot be done as asked.
     """
 
     tile_side = TILE
+    antialiases = False
+    notices = ()
 
     def __init__(
         self,
@@ -160,22 +166,36 @@ class Whitted:
 
     def traced(self, o, d, key, with_first):
         """What a primary ray sees; `with_first`: with the passes of what it meets."""
-        self.spent = dict.fromkeys(("rays_per_pixel", *(("n_it", "n_ts") if self.count else ())), 0)
         camera = self.scene.camera
+        path = Path(o, d, float(camera.near), float(camera.far), (1.0, 1.0, 1.0), 0, PRIMARY, key)
+        return self.followed(path, with_first)
+
+    def followed(self, path, with_first):
+        """What a primary ray, and all that comes of it, sees; `with_first` as for :meth:`traced`."""
+        self.spent = dict.fromkeys(("rays_per_pixel", *(("n_it", "n_ts") if self.count else ())), 0)
         radiance, first = (0.0, 0.0, 0.0), None
-        stack = [Path(o, d, float(camera.near), float(camera.far), (1.0, 1.0, 1.0), 0, PRIMARY, key)]
+        stack = [path]
         while stack:
-            path = stack.pop()
-            hit = self._closest(path.kind, path.o, path.d, path.t_min, path.t_max)
-            surface = None if hit is None else self.surfaces.at(hit, path.d)
-            first = first or (hit, surface)
-            if surface is None:
-                radiance = add(radiance, mul(path.weight, self._sky(path.d)))
-                continue
-            seen = self._seen(surface, path.d, path.key if self.soft else None)
-            radiance = add(radiance, mul(path.weight, times(surface.alpha, seen)))
-            stack += self._onward(path, hit, surface)
+            parts = self._met(stack.pop())
+            first = first or self._of_most(parts)
+            for path, hit, surface in parts:
+                if surface is None:
+                    radiance = add(radiance, mul(path.weight, self._sky(path.d)))
+                    continue
+                seen = self._seen(surface, path.d, path.key if self.soft else None)
+                radiance = add(radiance, mul(path.weight, times(surface.alpha, seen)))
+                stack += self._onward(path, hit, surface)
         return {"combined": radiance, **self.spent, **(self._first(*first) if with_first else {})}
+
+    def _met(self, path):
+        """What a path met: a list with the path as it goes on, the hit, and its surface; of a ray, just one."""
+        hit = self._closest(path.kind, path.o, path.d, path.t_min, path.t_max)
+        return [(path, hit, None if hit is None else self.surfaces.at(hit, path.d))]
+
+    @staticmethod
+    def _of_most(parts):
+        """Hit and surface of the part that weighs most, of equal ones the first."""
+        return max(parts, key=lambda part: max(part[0].weight))[1:]
 
     def _closest(self, kind, o, d, t_min, t_max, probe=None):
         """The nearest hit, counted."""
