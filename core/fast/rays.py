@@ -19,11 +19,13 @@ class Rays:
     t_min, t_max : ndarray, shape (n,)
     exponent : ndarray, shape (n,), int
         The scaled direction times 2**exponent is the caller's.
+    leaving : ndarray, shape (2, n), int, or None
+        Object and primitive that each ray leaves, where that is known; -1 for none.
     """
 
-    def __init__(self, o, d, t_min, t_max, exponent):
+    def __init__(self, o, d, t_min, t_max, exponent, leaving=None):
         self.n = o.shape[1]
-        self.o, self.d, self.t_min, self.t_max, self.exponent = o, d, t_min, t_max, exponent
+        self.o, self.d, self.t_min, self.t_max, self.exponent, self.leaving = o, d, t_min, t_max, exponent, leaving
 
     @classmethod
     def checked(cls, origins, directions, t_min, t_max):
@@ -68,7 +70,8 @@ class Rays:
             o, d = self.o[:, index], self.d[:, index]
         else:
             o, d = _taken(self.o, index), _taken(self.d, index)
-        return Rays(o, d, self.t_min[index], self.t_max[index], self.exponent[index])
+        leaving = None if self.leaving is None else self.leaving[:, index]
+        return Rays(o, d, self.t_min[index], self.t_max[index], self.exponent[index], leaving)
 
     def callers_t(self, t):
         """t in multiples of the caller's directions."""

@@ -33,7 +33,11 @@ class Structure:
         Filled by :meth:`build`: N_G, N_E, N_EE, N_ER, depth, memory, c_SAH, as far as they make sense.
     notices : list of Notice
         What the build could not do as asked, a guard that stopped it, for example.
+    follows : bool
+        Whether it makes use of knowing which primitive a ray leaves.
     """
+
+    follows = False
 
     def __init__(self, primitives, parameters, progress=None):
         self.primitives, self.parameters = primitives, parameters
@@ -72,7 +76,7 @@ class Structure:
         """
         return Cells.make([], [], [], [], [], [])
 
-    def closest(self, origins, directions, t_min=0.0, t_max=math.inf, count=False, progress=None):
+    def closest(self, origins, directions, t_min=0.0, t_max=math.inf, count=False, progress=None, leaving=None):
         """The nearest hit of every ray with t_min <= t <= t_max.
 
         Parameters
@@ -85,12 +89,14 @@ class Structure:
             Also count, per ray.
         progress : callable, optional
             Called with the fraction done after every batch; may raise Cancelled.
+        leaving : (array_like, array_like), optional
+            `object` and `primitive` of the hits that the rays leave, -1 for none: a hint, for techniques that follow rays.
 
         Returns
         -------
         Hits
         """
-        answers = self._ask(Closest, origins, directions, t_min, t_max, count, progress)
+        answers = self._ask(Closest, origins, directions, t_min, t_max, count, progress, leaving)
         n, rays, index, parts, counts = answers
         hits = Hits(t=np.full(n, np.inf), primitive=np.full(n, -1, np.int64), object=np.full(n, -1, np.int32),
                     u=np.zeros(n), v=np.zeros(n), part=np.zeros(n, np.int32), normal=np.zeros((n, 3)),
@@ -108,12 +114,12 @@ class Structure:
                 (hits.object[at], hits.primitive[at], hits.part[at], hits.normal[at], hits.point[at], hits.error[at]) = surface
         return hits
 
-    def occluded(self, origins, directions, t_min=0.0, t_max=math.inf, count=False, progress=None):
+    def occluded(self, origins, directions, t_min=0.0, t_max=math.inf, count=False, progress=None, leaving=None):
         """Whether anything lies at t_min <= t <= t_max.
 
         Parameters
         ----------
-        origins, directions, t_min, t_max, progress
+        origins, directions, t_min, t_max, progress, leaving
             As for :meth:`closest`.
         count : bool
             Also return the counts.
@@ -122,16 +128,18 @@ class Structure:
         -------
         ndarray of bool, shape (n,), or (ndarray, dict of ndarray) with the counts n_it, n_ts, n_ets, n_eets
         """
-        n, rays, index, parts, counts = self._ask(Occluded, origins, directions, t_min, t_max, count, progress)
+        n, rays, index, parts, counts = self._ask(Occluded, origins, directions, t_min, t_max, count, progress, leaving)
         blocked = np.zeros(n, bool)
         for start, query in parts:
             blocked[index[start + np.flatnonzero(query.blocked)]] = True
         return (blocked, counts) if count else blocked
 
-    def _ask(self, question, origins, directions, t_min, t_max, count, progress):
+    def _ask(self, question, origins, directions, t_min, t_max, count, progress, leaving):
         """Put a question to all rays, batch by batch."""
         n = len(origins)
         rays, index = Rays.checked(origins, directions, t_min, t_max)
+        if leaving is not None and self.follows:
+            rays.leaving = np.array(leaving, np.int64)[:, index]
         names = ("n_it", "n_ts", "n_ets", "n_eets")
         counts = {name: np.zeros(n, np.int64) for name in names} if count else {}
         parts = []

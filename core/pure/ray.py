@@ -26,6 +26,7 @@ class Ray:
         World space. The direction need not have unit length.
     t_min, t_max : float
         In multiples of `direction`.
+    leaving : (int, int), optional
 
     Attributes
     ----------
@@ -44,18 +45,20 @@ class Ray:
         kx, ky, kz: kz is the direction's largest component; kx and ky are swapped where it is negative.
     shear : tuple of 3 float
         Sx, Sy, Sz, constants of the watertight triangle test (Woop, Benthin and Wald 2013, section 3.1).
+    leaving : (int, int) or None
+        Object and primitive that the ray leaves, where that is known.
     slack : float
         Rounding error of positions on the ray, in space: a primitive's test may find a hit that lies this far
         outside the primitive's box, so boxes are met with this much to spare.
     """
 
-    __slots__ = ("usable", "o", "d", "t_min", "t_max", "exponent", "inverse", "axes", "shear", "slack", "_moment")
+    __slots__ = ("usable", "o", "d", "t_min", "t_max", "exponent", "inverse", "axes", "shear", "slack", "leaving", "_moment")
 
-    def __init__(self, origin, direction, t_min=0.0, t_max=math.inf):
+    def __init__(self, origin, direction, t_min=0.0, t_max=math.inf, leaving=None):
         ox, oy, oz = (float(x) for x in origin)
         dx, dy, dz = (float(x) for x in direction)
         largest = max(abs(dx), abs(dy), abs(dz))
-        self._moment = None
+        self._moment, self.leaving = None, leaving
         self.usable = (all(map(math.isfinite, (ox, oy, oz, dx, dy, dz))) and largest > 0.0 and t_min <= t_max)
         if not self.usable:
             return

@@ -47,7 +47,11 @@ class Structure:
         Filled by :meth:`build`: N_G, N_E, N_EE, N_ER, depth, memory, c_SAH, as far as they make sense.
     notices : list of Notice
         What the build could not do as asked, a guard that stopped it, for example.
+    follows : bool
+        Whether it makes use of knowing which primitive a ray leaves.
     """
+
+    follows = False
 
     def __init__(self, primitives, parameters, progress=None):
         self.primitives, self.parameters = primitives, parameters
@@ -126,7 +130,7 @@ class Structure:
             watch.begin(ray)
         return self.ask(Occluded, ray, watch).blocked
 
-    def closest(self, origins, directions, t_min=0.0, t_max=math.inf, count=False, progress=None):
+    def closest(self, origins, directions, t_min=0.0, t_max=math.inf, count=False, progress=None, leaving=None):
         """The nearest hit of every ray with t_min <= t <= t_max.
 
         Parameters
@@ -139,6 +143,8 @@ class Structure:
             Also count, per ray.
         progress : callable, optional
             Called with the fraction done after every ray; may raise Cancelled.
+        leaving : (sequence of int, sequence of int), optional
+            `object` and `primitive` of the hits that the rays leave, -1 for none: a hint, for techniques that follow rays.
 
         Returns
         -------
@@ -151,17 +157,17 @@ class Structure:
             For wrong shapes.
         """
         miss = Hit(math.inf, -1, -1, 0.0, 0.0, 0, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), 0.0, -1)
-        found, counts = self._answers(self.closest_ray, origins, directions, t_min, t_max, count, progress)
+        found, counts = self._answers(self.closest_ray, origins, directions, t_min, t_max, count, progress, leaving)
         found = [hit or miss for hit in found]
         fields = ("t", "primitive", "object", "u", "v", "part", "normal", "point", "error")
         return Hits(**{f: [getattr(hit, f) for hit in found] for f in fields}, **counts)
 
-    def occluded(self, origins, directions, t_min=0.0, t_max=math.inf, count=False, progress=None):
+    def occluded(self, origins, directions, t_min=0.0, t_max=math.inf, count=False, progress=None, leaving=None):
         """Whether anything lies at t_min <= t <= t_max.
 
         Parameters
         ----------
-        origins, directions, t_min, t_max, progress
+        origins, directions, t_min, t_max, progress, leaving
             As for :meth:`closest`.
         count : bool
             Also return the counts.
@@ -170,13 +176,16 @@ class Structure:
         -------
         list of bool, or (list, dict of lists) with the counts n_it, n_ts, n_ets, n_eets
         """
-        blocked, counts = self._answers(self.occluded_ray, origins, directions, t_min, t_max, count, progress)
+        blocked, counts = self._answers(self.occluded_ray, origins, directions, t_min, t_max, count, progress, leaving)
         return (blocked, counts) if count else blocked
 
-    def _answers(self, ask, origins, directions, t_min, t_max, count, progress):
+    def _answers(self, ask, origins, directions, t_min, t_max, count, progress, leaving):
         """The answers to all rays, and the counts where they are wanted."""
         answers, counters = [], []
         rays = list(rays_of(origins, directions, t_min, t_max))
+        if leaving is not None:
+            for ray, *surface in zip(rays, *map(_plain, leaving)):
+                ray.leaving = tuple(surface)
         for ray in rays:
             counter = Counter() if count else None
             answers.append(ask(ray, counter))

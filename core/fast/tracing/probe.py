@@ -27,7 +27,7 @@ class Probe:
         self.structure, self.check, self.count = structure, check, count
         self.piece = 4096
 
-    def closest(self, o, d, t_min, t_max):
+    def closest(self, o, d, t_min, t_max, leaving=None):
         """Hits of rays given as columns."""
 
         def ask(s):
@@ -38,6 +38,7 @@ class Probe:
                 t_max=_part(t_max, s),
                 count=self.count,
                 progress=self._progress,
+                **self._left(leaving, s),
             )
 
         parts = self._in_pieces(o.shape[1], ask)
@@ -46,18 +47,27 @@ class Probe:
         joined = {f.name: [getattr(p, f.name) for p in parts] for f in fields(Hits)}
         return Hits(**{name: None if values[0] is None else np.concatenate(values) for name, values in joined.items()})
 
-    def occluded(self, o, d, t_max):
+    def occluded(self, o, d, t_max, leaving=None):
         """Bool per ray, and the counts."""
 
         def ask(s):
             answer = self.structure.occluded(
-                o[:, s].T, d[:, s].T, t_max=_part(t_max, s), count=self.count, progress=self._progress
+                o[:, s].T,
+                d[:, s].T,
+                t_max=_part(t_max, s),
+                count=self.count,
+                progress=self._progress,
+                **self._left(leaving, s),
             )
             return answer if self.count else (answer, {})
 
         parts = self._in_pieces(o.shape[1], ask)
         counts = {name: np.concatenate([c[name] for _, c in parts]) for name in (COUNTED if self.count else ())}
         return np.concatenate([blocked for blocked, _ in parts]), counts
+
+    def _left(self, leaving, s):
+        """What the structure is told of where the rays start, if it wants to know."""
+        return {"leaving": leaving[:, s]} if self.structure.follows and leaving is not None else {}
 
     def _progress(self, fraction):
         self.check()

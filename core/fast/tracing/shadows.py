@@ -24,22 +24,24 @@ def passed(table, surface, d):
     return share + surface.alpha * transmission * (1.0 - reflected) * table.tint(surface)
 
 
-def filtered(closest, surfaces, o, d, reach):
+def filtered(closest, surfaces, o, d, reach, leaving):
     """Share of light, shape (3, n), that comes through all surfaces along rays.
 
     Parameters
     ----------
     closest : callable
-        ``closest(which, o, d, t_max)`` gives the Hits of the rays `which`.
+        ``closest(which, o, d, t_max, leaving)`` gives the Hits of the rays `which`.
     surfaces : Surfaces
     o, d : ndarray, shape (3, n)
     reach : float or ndarray, shape (n,)
         Distance of the light in multiples of d.
+    leaving : ndarray, shape (2, n)
+        Objects and primitives where the rays start.
     """
     colour = np.ones_like(o)
     which, left = np.arange(o.shape[1]), np.broadcast_to(reach, o.shape[1])
     while len(which):
-        hits = closest(which, o, d, left)
+        hits = closest(which, o, d, left, leaving)
         met = np.flatnonzero(hits.primitive >= 0)
         which, d, left, before = which[met], d[:, met], left[met] - hits.t[met], o[:, met]
         surface = surfaces.at(hits, met, d)
@@ -47,5 +49,5 @@ def filtered(closest, surfaces, o, d, reach):
         o = pushed(surface.point, surface.error, surface.normal, d)
         # A ray that gets no further would go on for ever.
         on = np.flatnonzero((colour[:, which] > 0.0).any(axis=0) & (left > 0.0) & (o != before).any(axis=0))
-        which, o, d, left = which[on], o[:, on], d[:, on], left[on]
+        which, o, d, left, leaving = which[on], o[:, on], d[:, on], left[on], surface.place[:, on]
     return colour

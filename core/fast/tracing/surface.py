@@ -71,6 +71,8 @@ class Surface:
     material : ndarray, shape (n,), int
     base : ndarray, shape (3, n)
     alpha : ndarray, shape (n,)
+    place : ndarray, shape (2, n), int64
+        Object and primitive.
     """
 
     point: np.ndarray
@@ -81,6 +83,7 @@ class Surface:
     material: np.ndarray
     base: np.ndarray
     alpha: np.ndarray
+    place: np.ndarray
 
     def take(self, which):
         """Some of the surfaces."""
@@ -94,6 +97,7 @@ class Surface:
             self.material[which],
             self.base[:, which],
             self.alpha[which],
+            self.place[:, which],
         )
 
 
@@ -193,6 +197,7 @@ class Surfaces:
             material,
             base,
             alpha,
+            np.stack([obj, primitive]),
         )
 
     def _material(self, obj, primitive, part):

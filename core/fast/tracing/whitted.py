@@ -45,11 +45,14 @@ class Wave:
     kind : ndarray, shape (n,)
     key : ndarray, shape (n,), uint64, or None
         Of their random numbers.
+    leaving : ndarray, shape (2, n), int64, or None
+        Objects and primitives that they leave; camera rays leave none.
     """
 
-    def __init__(self, o, d, t_max, weight, pixel, depth, kind, key, t_min=None):
+    def __init__(self, o, d, t_max, weight, pixel, depth, kind, key, leaving=None, t_min=None):
         self.o, self.d, self.t_max, self.weight = o, d, t_max, weight
         self.pixel, self.depth, self.kind, self.key = pixel, depth, kind, key
+        self.leaving = leaving
         self.t_min = 0.0 if t_min is None else t_min
 
     def __len__(self):
@@ -66,6 +69,7 @@ class Wave:
                 for name in ("o", "d", "t_max", "weight", "pixel", "depth", "kind")
             ),
             None if waves[0].key is None else np.concatenate([w.key for w in waves]),
+            None if waves[0].leaving is None else np.concatenate([w.leaving for w in waves], axis=1),
         )
 
 
@@ -225,7 +229,9 @@ class Whitted:
     def _closest(self, wave):
         """Nearest hits, counted."""
         first = wave.kind[0] == PRIMARY
-        hits = self.probe["primary" if first else "secondary"].closest(wave.o, wave.d, wave.t_min, wave.t_max)
+        hits = self.probe["primary" if first else "secondary"].closest(
+            wave.o, wave.d, wave.t_min, wave.t_max, wave.leaving
+        )
         for kind in (PRIMARY,) if first else (REFLECTED, REFRACTED, TRANSPARENT):
             which = slice(None) if first else np.flatnonzero(wave.kind == kind)
             self._count(
@@ -315,15 +321,15 @@ class Whitted:
             # A surface that the light lies in does not shade it.
             d = to + (point - o)
             reach = np.maximum(1.0 - self.rounding / np.abs(d).max(axis=0), 0.0)
-        pixel = pixel[which]
+        pixel, leaving = pixel[which], surface.place[:, which]
         if not self.coloured_shadows:
-            blocked, counts = probe.occluded(o, d, reach)
+            blocked, counts = probe.occluded(o, d, reach, leaving)
             self._count(SHADOW, pixel, np.count_nonzero(blocked), counts)
             return 1.0 - blocked
         from .shadows import filtered
 
-        def closest(which, o, d, t_max):
-            hits = probe.closest(o, d, 0.0, t_max)
+        def closest(which, o, d, t_max, leaving):
+            hits = probe.closest(o, d, 0.0, t_max, leaving)
             self._count(
                 SHADOW,
                 pixel[which],
@@ -332,7 +338,7 @@ class Whitted:
             )
             return hits
 
-        return filtered(closest, self.surfaces, o, d, reach)
+        return filtered(closest, self.surfaces, o, d, reach, leaving)
 
     def _towards(self, light):
         """Who is asked about shadow rays to a light."""
@@ -396,6 +402,7 @@ class Whitted:
             wave.depth[ray] + (kind != TRANSPARENT),
             np.full(len(ray), kind, np.uint8),
             key,
+            surface.place[:, which],
         )
 
     def _worth(self, kind, weight, key):

@@ -18,12 +18,12 @@ class Probe:
     def __init__(self, structure, count):
         self.structure, self.count = structure, count
 
-    def closest(self, o, d, t_min, t_max):
+    def closest(self, o, d, t_min, t_max, leaving=None):
         """The hit, or None, and a Counter where counted, else None."""
         counter = Counter() if self.count else None
-        return self.structure.closest_ray(Ray(o, d, t_min, t_max), counter), counter
+        return self.structure.closest_ray(Ray(o, d, t_min, t_max, leaving), counter), counter
 
-    def occluded(self, o, d, t_max):
+    def occluded(self, o, d, t_max, leaving=None):
         """Whether anything is in the way, and a Counter or None."""
         counter = Counter() if self.count else None
-        return self.structure.occluded_ray(Ray(o, d, 0.0, t_max), counter), counter
+        return self.structure.occluded_ray(Ray(o, d, 0.0, t_max, leaving), counter), counter

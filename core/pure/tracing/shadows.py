@@ -23,24 +23,27 @@ def passed(surface, d):
     return add(share, times(surface.alpha * material.transmission * (1.0 - reflected), surface.tint()))
 
 
-def filtered(closest, surfaces, o, d, reach):
+def filtered(closest, surfaces, o, d, reach, leaving):
     """Share of light, a colour, that comes through all surfaces along a ray.
 
     Parameters
     ----------
     closest : callable
-        ``closest(o, d, t_max)`` gives the Hit of a ray, or None.
+        ``closest(o, d, t_max, leaving)`` gives the Hit of a ray, or None.
     surfaces : Surfaces
     o, d : tuple of 3 float
     reach : float
         Distance of the light in multiples of d.
+    leaving : (int, int)
+        Object and primitive where the ray starts.
     """
     colour = (1.0, 1.0, 1.0)
     while reach > 0.0:
-        hit = closest(o, d, reach)
+        hit = closest(o, d, reach, leaving)
         if hit is None:
             break
         surface = surfaces.at(hit, d)
+        leaving = surface.place
         colour = mul(colour, passed(surface, d))
         if not max(colour) > 0.0:
             break

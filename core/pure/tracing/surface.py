@@ -23,6 +23,8 @@ class Surface:
     material : Material
     base : tuple of 3 float
     alpha : float
+    place : (int, int)
+        Object and primitive.
     """
 
     point: tuple
@@ -33,6 +35,7 @@ class Surface:
     material: Material
     base: tuple
     alpha: float
+    place: tuple
 
     def tint(self):
         """Colour that light takes on when it passes through."""
@@ -54,7 +57,8 @@ class Surfaces:
         outside = dot(d, hit.normal) <= 0.0
         normal = hit.normal if outside else times(-1.0, hit.normal)
         base, alpha = self._colour(material, obj.geometry, hit)
-        return Surface(hit.point, hit.error, normal, self._smooth(normal, hit, obj), outside, material, base, alpha)
+        shading = self._smooth(normal, hit, obj)
+        return Surface(hit.point, hit.error, normal, shading, outside, material, base, alpha, (hit.object, hit.primitive))
 
     def _material(self, obj, hit):
         """The material in the slot of the triangle, or of the solid's part; a slot past the end takes the last."""

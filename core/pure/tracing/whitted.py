@@ -40,6 +40,8 @@ class Path:
     kind : int
     key : int or None
         Of its random numbers.
+    leaving : (int, int) or None
+        Object and primitive that it leaves.
     """
 
     o: tuple
@@ -50,6 +52,7 @@ class Path:
     depth: int
     kind: int
     key: int | None
+    leaving: tuple | None = None
 
 
 class Whitted:
@@ -189,7 +192,7 @@ class Whitted:
 
     def _met(self, path):
         """What a path met: a list with the path as it goes on, the hit, and its surface; of a ray, just one."""
-        hit = self._closest(path.kind, path.o, path.d, path.t_min, path.t_max)
+        hit = self._closest(path.kind, path.o, path.d, path.t_min, path.t_max, path.leaving)
         return [(path, hit, None if hit is None else self.surfaces.at(hit, path.d))]
 
     @staticmethod
@@ -197,10 +200,10 @@ class Whitted:
         """Hit and surface of the part that weighs most, of equal ones the first."""
         return max(parts, key=lambda part: max(part[0].weight))[1:]
 
-    def _closest(self, kind, o, d, t_min, t_max, probe=None):
+    def _closest(self, kind, o, d, t_min, t_max, leaving, probe=None):
         """The nearest hit, counted."""
         probe = probe or self.probe["primary" if kind == PRIMARY else "secondary"]
-        hit, counter = probe.closest(o, d, t_min, t_max)
+        hit, counter = probe.closest(o, d, t_min, t_max, leaving)
         self._count(kind, hit is not None, counter)
         return hit
 
@@ -269,13 +272,17 @@ class Whitted:
             d = add(to, minus(surface.point, o))
             reach = max(1.0 - self.rounding / max(map(abs, d)), 0.0)
         if not self.coloured_shadows:
-            blocked, counter = self._towards(light).occluded(o, d, reach)
+            blocked, counter = self._towards(light).occluded(o, d, reach, surface.place)
             self._count(SHADOW, blocked, counter)
             return (0.0, 0.0, 0.0) if blocked else (1.0, 1.0, 1.0)
         from .shadows import filtered
 
         probe = self._towards(light)
-        return filtered(lambda o, d, t_max: self._closest(SHADOW, o, d, 0.0, t_max, probe), self.surfaces, o, d, reach)
+
+        def closest(o, d, t_max, leaving):
+            return self._closest(SHADOW, o, d, 0.0, t_max, leaving, probe)
+
+        return filtered(closest, self.surfaces, o, d, reach, surface.place)
 
     def _towards(self, light):
         """Who is asked about shadow rays to a light."""
@@ -305,7 +312,7 @@ class Whitted:
         if self.threshold:
             weight = self._worth(kind, weight, key)
         if weight:
-            yield Path(o, direction, 0.0, t_max, weight, path.depth + (kind != TRANSPARENT), kind, key)
+            yield Path(o, direction, 0.0, t_max, weight, path.depth + (kind != TRANSPARENT), kind, key, surface.place)
 
     def _worth(self, kind, weight, key):
         """The weight with which a ray is traced, or None if it is not."""
