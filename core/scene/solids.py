@@ -260,6 +260,12 @@ class Placed:
         return Placed([self.solids[i] for i in index], self.matrix[..., index], self.origin[:, index], self.inverse[..., index],
                       self.object_of[index], self.primitive_of[index])
 
+    @staticmethod
+    def concatenated(parts):
+        """Several sets of solids of one kind as one."""
+        return Placed([s for p in parts for s in p.solids], *(np.concatenate([getattr(p, name) for p in parts], axis=-1)
+                                                              for name in ("matrix", "origin", "inverse", "object_of", "primitive_of")))
+
     def mesh_corners(self):
         """World corners of the first solid's triangles, a closed mesh: shape (9, triangles); and whether they are turned inside out."""
         own = self.solids[0].values["mesh"]

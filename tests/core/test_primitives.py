@@ -504,7 +504,7 @@ def test_rays_that_are_looked_at_one_by_one_or_together_are_the_same():
 
 
 def test_where_lines_enter_and_leave():
-    """`intersections` covers the whole line, whatever the ray's interval, in both cores."""
+    """`events` covers the whole line, whatever the ray's interval, in both cores."""
     rng = np.random.default_rng(121)
     for name in CLOSED:
         matrix = affine(rng)
@@ -512,17 +512,20 @@ def test_where_lines_enter_and_leave():
         kind, pure = Primitives.of(scene, None).kinds[0], primitives_of(scene, None)[0]
         o, d = aimed(rng, matrix, 200)
         rays, _ = Rays.checked(o, d, 0.0, 0.5)
-        t_in, t_out, face_in, face_out = kind.intersections(rays, np.arange(200), np.zeros(200, int))
-        met = ~np.isnan(t_in)
-        assert 30 < met.sum() < 200 and (t_in[met] <= t_out[met]).all() and np.isnan(t_out[~met]).all()
+        pair, t, face, enters = kind.events(rays, np.arange(200), np.zeros(200, int))
+        assert (pair[::2] == pair[1::2]).all() and enters[::2].all() and not enters[1::2].any()
+        t_in, t_out = t[::2], t[1::2]
+        met = np.zeros(200, bool)
+        met[pair] = True
+        assert 30 < met.sum() < 200 and (t_in <= t_out).all()
         back = np.linalg.inv(matrix)
-        middle = rays.o + 0.5 * (t_in + t_out) * rays.d
+        middle = rays.o[:, met] + 0.5 * (t_in + t_out) * rays.d[:, met]
         unit = back[:3, :3] @ middle + back[:3, 3:]
-        assert all(CLOSED[name][1](*p) <= 1e-12 for p in unit.T[met])
+        assert all(CLOSED[name][1](*p) <= 1e-12 for p in unit.T)
         from rayscope.core.pure.ray import Ray
         for k in range(200):
-            alone = pure.intersections(Ray(o[k], d[k], 0.0, 0.5))
-            assert alone == ((t_in[k], t_out[k], face_in[k], face_out[k]) if met[k] else None)
+            at = np.flatnonzero(pair == k)
+            assert pure.events(Ray(o[k], d[k], 0.0, 0.5)) == list(zip(t[at], face[at]))
 
 
 @pytest.mark.parametrize("name", [*CLOSED, *OPEN])

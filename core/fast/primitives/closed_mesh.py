@@ -28,8 +28,8 @@ class ClosedMesh:
         self.lo, self.hi = xyz.reshape(3, 3, n).min(axis=(0, 2)), xyz.reshape(3, 3, n).max(axis=(0, 2))
         self.flip = flip
 
-    def events(self, rays, ray):
-        """Where lines enter and leave: t, shape (m, 2 k), ascending and padded with inf, and the triangles crossed there."""
+    def events(self, rays, ray, item):
+        """Where lines enter and leave; as of other solids."""
         from ..rays import Rays
         m = len(ray)
         lines = Rays(rays.o[:, ray], rays.d[:, ray], np.full(m, -np.inf), np.full(m, np.inf), np.zeros(m, np.int64))
@@ -50,21 +50,15 @@ class ClosedMesh:
             # Through the edge between a front and a back: the line only touches the mesh.
             keep = (ways_in == 0) | (ways_out == 0)
             line, triangle, t, enters = line[begin][keep], triangle[begin][keep], t[begin][keep], enters[begin][keep]
-        keep = np.ones(len(t), bool)
         # In and out take turns; what does not fit is a corner met from an awkward side.
-        keep[1:] = (line[1:] != line[:-1]) | (enters[1:] != enters[:-1])
-        starts = np.ones(len(t), bool)
-        starts[1:] = line[1:] != line[:-1]
-        ends = np.ones(len(t), bool)
-        ends[:-1] = starts[1:]
-        line, triangle, t = (c[keep & ~(starts & ~enters) & ~(ends & enters)] for c in (line, triangle, t))
-        count = np.bincount(line, minlength=m)
-        width = int(count.max(initial=0))
-        width += width % 2
-        out_t, out = np.full((m, width), np.inf), np.zeros((m, width), np.int64)
-        column = np.arange(len(line)) - np.repeat(np.cumsum(count) - count, count)
-        out_t[line, column], out[line, column] = t, triangle
-        return out_t, out
+        begins = np.diff(line, prepend=-1) > 0
+        keep = begins.copy()
+        keep[1:] |= enters[1:] != enters[:-1]
+        line, triangle, t, enters, begins = (c[keep] for c in (line, triangle, t, enters, begins))
+        ends = np.diff(line, append=m) > 0
+        keep = ~(begins & ~enters) & ~(ends & enters)
+        line, triangle, t, enters = (c[keep] for c in (line, triangle, t, enters))
+        return line, t, triangle, enters
 
     def _turned_towards(self, lines, line, triangle):
         """Bool per crossing: whether the triangle's outer side faces the line's origin."""
@@ -79,7 +73,7 @@ class ClosedMesh:
         det = (x[2] * y[1] - y[2] * x[1]) + (x[0] * y[2] - y[0] * x[2]) + (x[1] * y[0] - y[1] * x[0])
         return (det > 0.0) != self.flip
 
-    def coordinates(self, rays, ray, triangle):
+    def coordinates(self, rays, ray, item, t, triangle):
         """Barycentric weights of crossings."""
         lines = rays.take(ray)
         lines.t_min = np.full(len(ray), -np.inf)
@@ -88,6 +82,15 @@ class ClosedMesh:
         out_u, out_v = np.zeros(len(ray)), np.zeros(len(ray))
         out_u[pair], out_v[pair] = u, v
         return out_u, out_v
+
+    def surface(self, rays, item, t, u, v, triangle):
+        """What is there; as of triangles."""
+        return self.triangles.surface(rays, triangle, t, u, v, item)
+
+    def support(self, item, axis):
+        """Exact extents (d, D) along directions."""
+        along = axis @ self.triangles.xyz.reshape(3, 3, -1).transpose(1, 0, 2).reshape(3, -1)
+        return along.min(axis=1), along.max(axis=1)
 
 
 class _All:

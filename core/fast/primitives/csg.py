@@ -3,13 +3,18 @@
 Every leaf says where a line enters and leaves it. An inner node merges the crossings of its operands and keeps those at
 which its own state changes. Crossings nearer to each other than rounding count as one place: so faces that coincide
 leave neither a film nor a gap.
+
+All pairs of rays and combinations, whatever their trees, are worked on together: down from the roots to the leaves that
+rays come near, then level by level up again. A crossing is one entry of columns.
 """
 
 from importlib import import_module
 
 import numpy as np
 
-from ...scene.csg import DIFFERENCE, INTERSECTION, UNION, s_bounds
+from ...scene.csg import DIFFERENCE, INTERSECTION, OPERATIONS, UNION, s_bounds
+from ...scene.solids import Placed
+from ..bounds import between, meets
 from .closed_mesh import ClosedMesh
 from .solids import CLASSES
 
@@ -17,6 +22,48 @@ EPSILON = 2.0**-52
 #: A crossing's number: leaf, then whether its normal is turned round, then face or triangle.
 LEAF, TURNED = 41, 40
 FACE = (1 << TURNED) - 1
+_UNION, _DIFFERENCE = OPERATIONS.index(UNION), OPERATIONS.index(DIFFERENCE)
+
+
+class Leaves:
+    """All leaves of all combinations, one set of solids a kind.
+
+    Attributes
+    ----------
+    kinds : list
+        Analytic solids kind by kind, then closed meshes one by one.
+    kind, item : ndarray, shape (n,)
+        Where in `kinds` a leaf is, and which of that kind.
+    lo, hi : ndarray, shape (n, 3)
+    """
+
+    def __init__(self, placed):
+        by_kind = {}
+        for k, leaf in enumerate(placed):
+            name = leaf.solids[0].kind
+            by_kind.setdefault((name, k if name == "mesh" else 0), []).append(k)
+        self.kinds, self.kind, self.item = [], np.zeros(len(placed), np.int64), np.zeros(len(placed), np.int64)
+        self.lo, self.hi = np.zeros((len(placed), 3)), np.zeros((len(placed), 3))
+        for (name, _), some in by_kind.items():
+            self.kind[some], self.item[some] = len(self.kinds), np.arange(len(some))
+            if name == "mesh":
+                self.kinds.append(ClosedMesh(placed[some[0]]))
+            else:
+                module, class_ = CLASSES[name]
+                self.kinds.append(getattr(import_module(f".{module}", __package__), class_)(Placed.concatenated([placed[k] for k in some])))
+            self.lo[some], self.hi[some] = self.kinds[-1].lo, self.kinds[-1].hi
+
+    def of(self, leaf):
+        """One leaf's kind, and its number there."""
+        return self.kinds[self.kind[leaf]], self.item[leaf]
+
+    def by_kind(self, leaf):
+        """Yield (kind, positions in `leaf`, numbers in the kind) for the kinds that occur."""
+        own = self.kind.take(leaf)
+        for k, kind in enumerate(self.kinds):
+            at = np.flatnonzero(own == k)
+            if len(at):
+                yield kind, at, self.item.take(leaf.take(at))
 
 
 class Trees:
@@ -24,130 +71,207 @@ class Trees:
 
     Attributes
     ----------
-    trees : list of Tree
-        Of :mod:`~rayscope.core.scene.solids`.
     leaf_tests : int
         Tests of rays against leaves so far.
+    leaves : Leaves
+    op, left, right : ndarray
+        Nodes of all trees: number of the operation in ``OPERATIONS``, -1 for a leaf; operands.
+    parent, second, level, leaf : ndarray
+        Each node's parent, whether it is the second operand there, its distance from the root, and its leaf's number.
+    low, high : ndarray, shape (3, nodes)
+        S-bounds, grown by what rounding of the boxes may do.
+    root, first_leaf : ndarray, shape (n,)
+    prune : ndarray, shape (n,), bool
     """
 
     KIND = "csg"
 
     def __init__(self, trees):
-        leaves = [[_leaf(placed) for placed in t.leaves] for t in trees]
-        boxes = [s_bounds(t.nodes, [_box(leaf) for leaf in own]) for t, own in zip(trees, leaves)]
+        self.leaves = Leaves([leaf for t in trees for leaf in t.leaves])
+        first_leaf = np.cumsum([0] + [len(t.leaves) for t in trees])
+        boxes = [s_bounds(t.nodes, [(tuple(lo), tuple(hi)) for lo, hi in zip(self.leaves.lo[a:b].tolist(), self.leaves.hi[a:b].tolist())])
+                 for t, a, b in zip(trees, first_leaf[:-1], first_leaf[1:])]
         # Combinations of which anything is left.
         kept = [k for k, b in enumerate(boxes) if b[-1][0][0] <= b[-1][1][0]]
-        self.trees, self.leaves, self._boxes = ([x[k] for k in kept] for x in (trees, leaves, boxes))
+        self.trees, boxes, self.first_leaf = [trees[k] for k in kept], [boxes[k] for k in kept], first_leaf[kept]
         self.n, self.leaf_tests = len(kept), 0
         self.object_of = np.array([t.object for t in self.trees], np.int32)
         self.primitive_of = np.array([t.primitive for t in self.trees], np.int64)
-        self.lo, self.hi = (np.array([b[-1][end] for b in self._boxes]).reshape(-1, 3) for end in (0, 1))
+        self.prune = np.array([t.prune for t in self.trees], bool)
+        self.lo, self.hi = (np.array([b[-1][end] for b in boxes]).reshape(-1, 3) for end in (0, 1))
+        self._number_nodes()
+        low, high = (np.array([node[end] for b in boxes for node in b]).reshape(-1, 3).T for end in (0, 1))
+        self.empty = low[0] > high[0]
+        slack = np.where(self.empty, 0.0, 64 * EPSILON * np.maximum(np.abs(low), np.abs(high)))
+        self.low, self.high = low - slack, high + slack
+
+    def _number_nodes(self):
+        """Fill in the columns of all trees' nodes."""
+        total = sum(len(t.nodes) for t in self.trees)
+        self.op, self.leaf = np.full(total, -1), np.zeros(total, np.int64)
+        self.left, self.right, self.parent, self.level = (np.zeros(total, np.int64) for _ in range(4))
+        self.second, self.root = np.zeros(total, bool), np.zeros(self.n, np.int64)
+        begin = 0
+        for k, tree in enumerate(self.trees):
+            self.root[k] = begin + len(tree.nodes) - 1
+            for number in range(len(tree.nodes) - 1, -1, -1):
+                here, (op, *operands) = begin + number, tree.nodes[number]
+                if op == "leaf":
+                    self.leaf[here] = operands[0]
+                    continue
+                self.op[here] = OPERATIONS.index(op)
+                self.left[here], self.right[here] = own = [begin + c for c in operands]
+                self.parent[own], self.level[own] = here, self.level[here] + 1
+                self.second[own[1]] = True
+            begin += len(tree.nodes)
 
     def bounds(self):
         """World boxes (lo, hi), each of shape (n, 3); lo > hi where nothing is left."""
         return self.lo, self.hi
 
+    def _near(self, rays, ray, item):
+        """Pairs and leaves (nodes) that the pairs' lines come near, from the roots down."""
+        pair, node, prune = np.arange(len(item)), self.root[item], self.prune[item]
+        found = []
+        while len(pair):
+            if prune.any():
+                near = ~prune[pair] | self._meets(rays, ray.take(pair), node)
+                pair, node = pair[near], node[near]
+            inner = self.op.take(node) >= 0
+            found.append((pair[~inner], node[~inner]))
+            pair, node = pair[inner], node[inner]
+            pair, node = np.concatenate([pair, pair]), np.concatenate([self.left.take(node), self.right.take(node)])
+        return [np.concatenate(c) for c in zip(*found)] if found else (pair, node)
+
+    def _meets(self, rays, ray, node):
+        """Bool per ray: whether its line comes near a node's S-bounds; never False for one that meets them."""
+        t_in, t_out = np.full(len(ray), -np.inf), np.full(len(ray), np.inf)
+        for a in range(3):
+            o = rays.o[a].take(ray)
+            slack = (64 * EPSILON) * np.abs(o)
+            t_in, t_out = between(t_in, t_out, self.low[a].take(node) - slack, self.high[a].take(node) + slack, o, rays.inverse[a].take(ray))
+        return meets(t_in, t_out) & ~self.empty.take(node)
+
     def _crossings(self, rays, ray, item):
-        """Crossings of pairs with combinations: t, shape (m, 2 k), ascending and padded with inf, and their numbers."""
+        """Crossings of pairs with combinations: pair, t, number; of one pair one after the other, ascending in t."""
+        pair, node = self._near(rays, ray, item)
+        self.leaf_tests += len(pair)
         parts = []
-        for tree in np.unique(item):
-            at = np.flatnonzero(item == tree)
-            parts.append((at, *self._node(int(tree), len(self.trees[tree].nodes) - 1, rays, ray[at])))
-        width = max((t.shape[1] for _, t, _ in parts), default=0)
-        out_t, out = np.full((len(item), width), np.inf), np.zeros((len(item), width), np.int64)
-        for at, t, number in parts:
-            out_t[at, :t.shape[1]], out[at, :t.shape[1]] = t, number
-        return out_t, out
+        number = self.leaf.take(node)
+        for kind, at, own in self.leaves.by_kind(self.first_leaf.take(item.take(pair)) + number):
+            which, t, face, enters = kind.events(rays, ray.take(pair.take(at)), own)
+            at = at.take(which)
+            parts.append((pair.take(at), node.take(at), t, number.take(at) << LEAF | face, enters))
+        if not parts:
+            return pair, np.zeros(0), pair
+        events = [np.concatenate(c) for c in zip(*parts)]
+        size = np.abs(rays.o).max(axis=0).take(ray)
+        level = self.level.take(events[1])
+        merged = [c[:0] for c in events]
+        for here in range(int(level.max(initial=0)), 0, -1):
+            own = np.flatnonzero(level == here)
+            if len(own) or len(merged[0]):
+                merged = self._combined(*(np.concatenate([c, e.take(own)]) for c, e in zip(merged, events)), size)
+        # Combinations of a single leaf go through no node.
+        own = np.flatnonzero(level == 0)
+        pair, _, t, number, _ = (np.concatenate([c, e.take(own)]) for c, e in zip(merged, events))
+        return pair, t, number
 
-    def _node(self, tree, node, rays, ray):
-        """Crossings of rays with a node."""
-        if self.trees[tree].prune:
-            met = np.flatnonzero(_meets(rays, ray, *self._boxes[tree][node]))
-            if len(met) < len(ray):
-                own_t, own = self._evaluated(tree, node, rays, ray[met])
-                t, number = np.full((len(ray), own.shape[1]), np.inf), np.zeros((len(ray), own.shape[1]), np.int64)
-                t[met], number[met] = own_t, own
-                return t, number
-        return self._evaluated(tree, node, rays, ray)
+    def _combined(self, pair, node, t, number, enters, size):
+        """Crossings with the parents of nodes, from those with all nodes of one level.
 
-    def _evaluated(self, tree, node, rays, ray):
-        if not len(ray):
-            return np.zeros((0, 0)), np.zeros((0, 0), np.int64)
-        op, *operands = self.trees[tree].nodes[node]
-        if op != "leaf":
-            return combine(op, *(x for k in operands for x in self._node(tree, k, rays, ray)), rays, ray)
-        number = operands[0]
-        leaf = self.leaves[tree][number]
-        self.leaf_tests += len(ray)
-        if isinstance(leaf, ClosedMesh):
-            t, face = leaf.events(rays, ray)
-        else:
-            t_in, t_out, face_in, face_out = leaf.intersections(rays, ray, np.zeros(len(ray), np.int64))
-            t = np.stack([t_in, t_out], axis=1)
-            t[np.isnan(t)] = np.inf
-            face = np.stack([face_in, face_out], axis=1)
-        return t, number << LEAF | face
+        Parameters
+        ----------
+        pair, node, t, number, enters : ndarray
+            The crossings: of one pair and node ascending in t, entering and leaving in turn.
+        size : ndarray
+            Each pair's largest coordinate of the origin.
+
+        Returns
+        -------
+        The same columns, for the parents.
+        """
+        row, second = pair * len(self.op) + self.parent.take(node), self.second.take(node)
+        order = np.lexsort((second, t, row))
+        row, second, pair, t, number, enters = (c.take(order) for c in (row, second, pair, t, number, enters))
+        parent = row % len(self.op)
+        op = self.op.take(parent)
+        # A - B is A with all that is not B: entering B is leaving that, and its normals are turned round.
+        turned = second & (op == _DIFFERENCE)
+        number = number ^ (turned.astype(np.int64) << TURNED)
+        # What is entered is left again: sums begin at zero in every row.
+        step = np.where(enters, 1, -1)
+        in_first = np.cumsum(np.where(second, 0, step)) > 0
+        in_second = (np.cumsum(np.where(second, step, 0)) > 0) ^ (op == _DIFFERENCE)
+        inside = np.where(op == _UNION, in_first | in_second, in_first & in_second)
+        first = np.ones(len(t), bool)
+        with np.errstate(invalid="ignore"):
+            first[1:] = (row[1:] != row[:-1]) | ~(t[1:] - t[:-1] <= 64 * EPSILON * (size.take(pair[1:]) + 2.0 * np.abs(t[1:])))
+        begin = np.flatnonzero(first)
+        place = np.cumsum(first) - 1
+        after = inside.take(np.append(begin[1:], len(t)) - 1)
+        changes = after.copy()
+        changes[1:] ^= after[:-1]
+        # Of the crossings at a place, one that goes the way the state does stands for it: the first one.
+        fits = np.flatnonzero(changes.take(place) & ((enters ^ turned) == after.take(place)))
+        own = place.take(fits)
+        keep = fits[np.diff(own, prepend=-1) > 0]
+        return [c.take(keep) for c in (pair, parent, t, number)] + [after.take(place.take(keep))]
 
     def _nearest(self, rays, ray, item, t_far):
         """Pairs that hit, and their nearest crossings in the rays' intervals."""
-        t, number = self._crossings(rays, ray, item)
-        within = (t >= rays.t_min[ray][:, None]) & (t <= t_far[ray][:, None]) & (np.abs(t) < np.inf)
-        pair = np.flatnonzero(within.any(axis=1)) if t.shape[1] else np.zeros(0, np.int64)
-        first = within[pair].argmax(axis=1) if len(pair) else pair
-        return pair, t[pair, first], number[pair, first]
+        pair, t, number = self._crossings(rays, ray, item)
+        own = ray.take(pair)
+        within = np.flatnonzero((t >= rays.t_min.take(own)) & (t <= t_far.take(own)) & (np.abs(t) < np.inf))
+        order = np.argsort(pair.take(within), kind="stable")
+        within = within.take(order)
+        pair = pair.take(within)
+        first = within[np.diff(pair, prepend=-1) > 0]
+        return pair[np.diff(pair, prepend=-1) > 0], t.take(first), number.take(first)
 
     def intersect(self, rays, ray, item, t_far):
         """Nearest hits of pairs; see the package's interface. `detail` is the crossing's number."""
         pair, t, number = self._nearest(rays, ray, item, t_far)
         u, v = np.zeros(len(pair)), np.zeros(len(pair))
-        ray, item = ray[pair], item[pair]
-        for at, leaf, face in self._by_leaf(item, number):
-            if isinstance(leaf, ClosedMesh):
-                u[at], v[at] = leaf.coordinates(rays, ray[at], face)
-            else:
-                u[at], v[at] = leaf.coordinates(rays, ray[at], np.zeros(len(at), np.int64), t[at], face)
+        ray, face = ray.take(pair), number & FACE
+        for kind, at, own in self.leaves.by_kind(self._leaf_of(item.take(pair), number)):
+            u[at], v[at] = kind.coordinates(rays, ray.take(at), own, t.take(at), face.take(at))
         return pair, t, u, v, number
+
+    def _leaf_of(self, item, number):
+        """Leaves that crossings are on."""
+        return self.first_leaf.take(item) + (number >> LEAF)
 
     def blocks(self, rays, ray, item, t_far):
         """The pairs that hit."""
         return self._nearest(rays, ray, item, t_far)[0]
 
-    def _by_leaf(self, item, number):
-        """Yield (positions, leaf, faces) for the leaves that occur."""
-        key = item * (1 << 20) + (number >> LEAF)
-        for k in np.unique(key):
-            at = np.flatnonzero(key == k)
-            yield at, self.leaves[k >> 20][k & (1 << 20) - 1], number[at] & FACE
-
     def surface(self, rays, item, t, u, v, number):
         """Object, primitive, part, normal, point and error of hits, one a ray. Parts are leaves, from left to right."""
         n = len(item)
         normal, point, error = np.zeros((n, 3)), np.zeros((n, 3)), np.zeros(n)
-        for at, leaf, face in self._by_leaf(item, number):
-            own = rays.take(at)
-            if isinstance(leaf, ClosedMesh):
-                found = leaf.triangles.surface(own, face, t[at], u[at], v[at], np.zeros(len(at), np.int64))
-            else:
-                found = leaf.surface(own, np.zeros(len(at), np.int64), t[at], u[at], v[at], face)
-            normal[at], point[at], error[at] = found[3:]
+        face = number & FACE
+        for kind, at, own in self.leaves.by_kind(self._leaf_of(item, number)):
+            normal[at], point[at], error[at] = kind.surface(rays.take(at), own, t[at], u[at], v[at], face[at])[3:]
         normal[(number >> TURNED & 1) == 1] *= -1.0
         return self.object_of[item], self.primitive_of[item], (number >> LEAF).astype(np.int32), normal, point, error
 
     def support(self, item, axis):
         """Extents (d, D) along directions, never too small: those of the boxes and of what operands leave."""
         low, high = np.empty(len(item)), np.empty(len(item))
-        for tree in np.unique(item):
-            at = np.flatnonzero(item == tree)
+        for k in np.unique(item):
+            at = np.flatnonzero(item == k)
             a = axis[at]
             done = []
-            for op, *operands in self.trees[tree].nodes:
+            for op, *operands in self.trees[k].nodes:
                 if op == "leaf":
-                    done.append(_extent(self.leaves[tree][operands[0]], a))
+                    kind, own = self.leaves.of(self.first_leaf[k] + operands[0])
+                    done.append(kind.support(np.full(len(at), own), a))
                     continue
-                (l, h), (l1, h1) = (done[k] for k in operands)
+                (l, h), (l1, h1) = (done[c] for c in operands)
                 done.append({UNION: (np.minimum(l, l1), np.maximum(h, h1)), INTERSECTION: (np.maximum(l, l1), np.minimum(h, h1)),
                              DIFFERENCE: (l, h)}[op])
-            ends = a * self.lo[tree], a * self.hi[tree]
+            ends = a * self.lo[k], a * self.hi[k]
             low[at] = np.maximum(done[-1][0], np.minimum(*ends).sum(axis=1))
             high[at] = np.minimum(done[-1][1], np.maximum(*ends).sum(axis=1))
         return low, high
@@ -159,108 +283,3 @@ class Trees:
     def clip(self, item, lo, hi):
         """Boxes of the parts inside boxes, by the combinations' own boxes."""
         return np.maximum(self.lo[item], lo), np.minimum(self.hi[item], hi)
-
-
-def _leaf(placed):
-    """A leaf's arithmetic."""
-    kind = placed.solids[0].kind
-    if kind == "mesh":
-        return ClosedMesh(placed)
-    module, name = CLASSES[kind]
-    return getattr(import_module(f".{module}", __package__), name)(placed)
-
-
-def _box(leaf):
-    """A leaf's box as two triples."""
-    return tuple(np.reshape(leaf.lo, 3).tolist()), tuple(np.reshape(leaf.hi, 3).tolist())
-
-
-def _extent(leaf, axis):
-    """Exact extent of a leaf along directions."""
-    if isinstance(leaf, ClosedMesh):
-        along = leaf.triangles.xyz.reshape(3, 3, -1).transpose(0, 2, 1).reshape(-1, 3) @ axis.T
-        return along.min(axis=0), along.max(axis=0)
-    return leaf.support(np.zeros(len(axis), np.int64), axis)
-
-
-def _meets(rays, ray, lo, hi):
-    """Bool per ray: whether its line comes near a box; never False for one that meets it."""
-    if lo[0] > hi[0]:
-        return np.zeros(len(ray), bool)
-    near, far = np.full(len(ray), -np.inf), np.full(len(ray), np.inf)
-    with np.errstate(all="ignore"):
-        for a in range(3):
-            o, d = rays.o[a].take(ray), rays.d[a].take(ray)
-            slack = 64 * EPSILON * (np.abs(o) + max(abs(lo[a]), abs(hi[a])))
-            low, high = lo[a] - slack - o, hi[a] + slack - o
-            flat = d == 0.0
-            one, other = low / d, high / d
-            near = np.maximum(near, np.where(flat, np.where((low <= 0.0) & (high >= 0.0), -np.inf, np.inf), np.minimum(one, other)))
-            far = np.minimum(far, np.where(flat, np.inf, np.maximum(one, other)))
-        far = far + 8 * EPSILON * np.abs(far)
-        near = near - 8 * EPSILON * np.abs(near)
-    return near <= far
-
-
-def combine(op, t_left, left, t_right, right, rays, ray):
-    """Crossings of lines with a combination, from those with its operands.
-
-    Parameters
-    ----------
-    op : str
-    t_left, t_right : ndarray, shape (m, 2 k)
-        Ascending, entering and leaving in turn; padded with inf.
-    left, right : ndarray of int64
-        The crossings' numbers.
-    rays, ray
-        The lines.
-
-    Returns
-    -------
-    t, number
-    """
-    m, a = t_left.shape
-    b = t_right.shape[1]
-    if a + b == 0:
-        return t_left, left
-    if op == DIFFERENCE:
-        # A - B is A with all that is not B: entering B is leaving that, and its normals are turned round.
-        right = right ^ (1 << TURNED)
-    t = np.concatenate([t_left, t_right], axis=1)
-    number = np.concatenate([left, right], axis=1)
-    step_left = np.concatenate([np.tile([1, -1], a // 2), np.zeros(b, np.int64)])
-    step_right = np.concatenate([np.zeros(a, np.int64), np.tile([1, -1], b // 2)]) * (-1 if op == DIFFERENCE else 1)
-    order = np.argsort(t, axis=1, kind="stable")
-    t, number = np.take_along_axis(t, order, 1), np.take_along_axis(number, order, 1)
-    steps = step_left[order] + step_right[order]
-    real = t < np.inf
-    state_left = np.cumsum(np.where(real, step_left[order], 0), axis=1) > 0
-    state_right = np.cumsum(np.where(real, step_right[order], 0), axis=1) + (op == DIFFERENCE) > 0
-    inside = state_left | state_right if op == UNION else state_left & state_right
-    # The last crossing of each place; the state after it is the place's, the state before is the place's before.
-    slack = 64 * EPSILON * (np.abs(rays.o).max(axis=0)[ray][:, None] + 2.0 * np.abs(np.where(real, t, 0.0)))
-    last = np.ones(t.shape, bool)
-    with np.errstate(invalid="ignore"):
-        last[:, :-1] = ~(t[:, 1:] - t[:, :-1] <= slack[:, 1:])
-    outside = np.zeros((m, 1), bool)
-    first = np.concatenate([np.ones((m, 1), bool), last[:, :-1]], axis=1)
-    before_place = np.concatenate([outside, inside[:, :-1]], axis=1)
-    place_before = _held(before_place, first)
-    place_after = _held(inside[:, ::-1], last[:, ::-1])[:, ::-1]
-    # Of the crossings at a place, one that goes the way the state does stands for it: the first one.
-    keep = real & (place_before != place_after) & (steps == np.where(place_after, 1, -1))
-    column = np.arange(t.shape[1])
-    place = np.cumsum(first, axis=1)
-    kept_at = np.where(keep, place, 0)
-    seen = np.maximum.accumulate(np.concatenate([np.zeros((m, 1), np.int64), kept_at[:, :-1]], axis=1), axis=1)
-    keep &= kept_at > seen
-    t = np.where(keep, t, np.inf)
-    order = np.argsort(np.where(keep, column, len(column)), axis=1, kind="stable")
-    width = int(keep.sum(axis=1).max(initial=0))
-    return np.take_along_axis(t, order, 1)[:, :width], np.take_along_axis(number, order, 1)[:, :width]
-
-
-def _held(values, at):
-    """Each row's values where `at` is true, held until the next such place."""
-    column = np.where(at, np.arange(values.shape[1]), 0)
-    return np.take_along_axis(values, np.maximum.accumulate(column, axis=1), 1)

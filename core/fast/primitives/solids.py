@@ -168,19 +168,19 @@ class UnitShapes:
         """The pairs that hit."""
         return self._nearest(rays, ray, item, t_far)[0]
 
-    def intersections(self, rays, ray, item):
+    def events(self, rays, ray, item):
         """Where lines enter and leave closed shapes, for CSG.
 
         Returns
         -------
-        t_in, t_out : ndarray
-            NaN for pairs that do not meet; t_in <= t_out.
-        face_in, face_out : ndarray
+        pair, t, face, enters : ndarray
+            The crossings; of one pair one after the other.
         """
         with np.errstate(all="ignore"):
             t_in, face_in, t_out, face_out = self.crossings(*self._to_unit(rays, ray, item), item)
-        miss = ~(t_in <= t_out)
-        return np.where(miss, np.nan, t_in), np.where(miss, np.nan, t_out), face_in, face_out
+        pair = np.flatnonzero(t_in <= t_out)
+        t, face = (np.stack([first.take(pair), second.take(pair)], axis=1).ravel() for first, second in ((t_in, t_out), (face_in, face_out)))
+        return np.repeat(pair, 2), t, face, np.tile([True, False], len(pair))
 
     def surface(self, rays, item, t, u, v, face):
         """Object, primitive, part, normal, point and error of hits, one a ray."""

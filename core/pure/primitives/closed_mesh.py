@@ -62,6 +62,17 @@ class ClosedMesh:
         det = (cx * by - cy * bx) + (ax * cy - ay * cx) + (bx * ay - by * ax)
         return (det > 0.0) != self.flip
 
+    def coordinates(self, ray, t, triangle):
+        """Barycentric weights where a ray crosses a triangle."""
+        line = copy.copy(ray)
+        line.t_min = -math.inf
+        _, u, v, _ = self.triangles[triangle].intersect(line, math.inf)
+        return u, v
+
+    def surface(self, ray, t, u, v, triangle):
+        """What is there; as of triangles."""
+        return self.triangles[triangle].surface(ray, t, u, v, 0)
+
     def support(self, axis):
         along = [dot(p, axis) for t in self.triangles for p in (t.a, t.b, t.c)]
         return min(along), max(along)

@@ -5,7 +5,6 @@ which its own state changes. Crossings nearer to each other than rounding count 
 leave neither a film nor a gap.
 """
 
-import copy
 import math
 from importlib import import_module
 
@@ -59,34 +58,17 @@ class Tree(Primitive):
         number = operands[0]
         leaf = self.leaves[number]
         self.leaf_tests += 1
-        if isinstance(leaf, ClosedMesh):
-            return [(t, number << LEAF | k) for t, k in leaf.events(ray)]
-        found = leaf.intersections(ray)
-        if found is None:
-            return []
-        t_in, t_out, face_in, face_out = found
-        return [(t_in, number << LEAF | face_in), (t_out, number << LEAF | face_out)]
+        return [(t, number << LEAF | face) for t, face in leaf.events(ray)]
 
     def intersect(self, ray, t_far, watch=None):
         for t, number in self.crossings(ray):
             if ray.t_min <= t <= t_far and math.isfinite(t):
-                leaf, face = self.leaves[number >> LEAF], number & FACE
-                if isinstance(leaf, ClosedMesh):
-                    line = copy.copy(ray)
-                    line.t_min = -math.inf
-                    _, u, v, _ = leaf.triangles[face].intersect(line, math.inf)
-                else:
-                    u, v = leaf.coordinates(ray, t, face)
+                u, v = self.leaves[number >> LEAF].coordinates(ray, t, number & FACE)
                 return t, u, v, number
         return None
 
     def surface(self, ray, t, u, v, number):
-        leaf, face = self.leaves[number >> LEAF], number & FACE
-        if isinstance(leaf, ClosedMesh):
-            found = leaf.triangles[face].surface(ray, t, u, v, 0)
-        else:
-            found = leaf.surface(ray, t, u, v, face)
-        _, _, _, normal, point, error = found
+        *_, normal, point, error = self.leaves[number >> LEAF].surface(ray, t, u, v, number & FACE)
         if number >> TURNED & 1:
             normal = tuple(-x for x in normal)
         return self.object, self.primitive, number >> LEAF, normal, point, error

@@ -158,10 +158,10 @@ class UnitShape(Primitive):
         o, d = self.to_unit(ray)
         return self.parameters(self.project([x + t * y for x, y in zip(o, d)], face), face)
 
-    def intersections(self, ray):
-        """Where the line enters and leaves a closed shape, for CSG: (t_in, t_out, face_in, face_out), or None."""
+    def events(self, ray):
+        """Where the line enters and leaves a closed shape, for CSG: [(t, face), ...], in and out in turn."""
         t_in, face_in, t_out, face_out = self.crossings(*self.to_unit(ray))
-        return (t_in, t_out, face_in, face_out) if t_in <= t_out else None
+        return [(t_in, face_in), (t_out, face_out)] if t_in <= t_out else []
 
     def surface(self, ray, t, u, v, face):
         o, d = self.to_unit(ray)
