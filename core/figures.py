@@ -14,6 +14,7 @@ FIGURES = {
     "load_factor": "entries of the hash table over its size",
     "collisions": "entries of the hash table that are not the first of their chain",
     "surplus": "references of cells that intersecting lists adds, as a part of those of exact lists",
+    "loose": "references that the loose bound on angles lists, over those of the tight one",
     "depth": "levels below the root",
     "memory": "bytes of the structure",
     "c_SAH": "SAH cost, c_T = c_I = 1",

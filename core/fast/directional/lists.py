@@ -100,25 +100,17 @@ class Lists:
             query.counts.steps(ray)
             query.counts.elementary(ray, np.flatnonzero(cursor == end))
         u, v, nearness = (c.astype(np.float32) for c in (u, v, nearness))
-        live, size = np.flatnonzero(cursor < end), FIRST_ROUND
-        while len(live):
+
+        def matters(live):
             # The nearest entry left must be near enough, and the ray not blocked already.
             first = self.feet.nearest.take(self.entry.take(cursor.take(live)))
-            live = live[(first >= nearness.take(live)) & (query.t.take(ray.take(live)) > -np.inf)]
-            for k in range(0, len(live), max(1, PAIRS // size)):
-                self._round(query, ray, u, v, nearness, cursor, end, live[k:k + max(1, PAIRS // size)], size)
-            cursor[live] += size
-            live = live[cursor.take(live) < end.take(live)]
-            size = min(2 * size, PAIRS)
+            return (first >= nearness.take(live)) & (query.t.take(ray.take(live)) > -np.inf)
 
-    def _round(self, query, ray, u, v, nearness, cursor, end, some, size):
-        """Test some rays against the next entries of their lists."""
-        begin = cursor.take(some)
-        count = np.minimum(end.take(some) - begin, size)
-        ends = np.cumsum(count)
-        which = np.repeat(np.arange(len(some)), count)
-        foot = self.entry.take(np.arange(int(ends[-1])) + (begin - (ends - count)).take(which))
-        which = some.take(which)
+        for which, place in in_rounds(cursor, end, matters):
+            self._look(query, ray, u, v, nearness, which, self.entry.take(place))
+
+    def _look(self, query, ray, u, v, nearness, which, foot):
+        """Test pairs of rays and footprints."""
         feet, limit = self.feet, nearness.take(which)
         # Nearest first: often that alone tells.
         keep = np.flatnonzero(feet.nearest.take(foot) >= limit)
@@ -132,3 +124,34 @@ class Lists:
         keep = np.flatnonzero((near >= limit) & inside(feet, foot, own_u, own_v))
         if len(keep):
             query.test(ray.take(which.take(keep)), feet.item.take(foot.take(keep)))
+
+
+def in_rounds(cursor, end, matters):
+    """Yield entries of lists: the first few of every list, then of those that go on twice as many, and so on.
+
+    Parameters
+    ----------
+    cursor, end : ndarray, shape (n,)
+        Where the lists begin and end; `cursor` is moved on.
+    matters : callable
+        ``matters(live)``: a mask of the lists `live` that go on at `cursor`.
+
+    Yields
+    ------
+    which, place : ndarray
+        Numbers of lists, and places of entries, one for each entry.
+    """
+    live, size = np.flatnonzero(cursor < end), FIRST_ROUND
+    while len(live):
+        live = live[matters(live)]
+        step = max(1, PAIRS // size)
+        for k in range(0, len(live), step):
+            some = live[k:k + step]
+            begin = cursor.take(some)
+            count = np.minimum(end.take(some) - begin, size)
+            ends = np.cumsum(count)
+            which = np.repeat(np.arange(len(some)), count)
+            yield some.take(which), np.arange(int(ends[-1])) + (begin - (ends - count)).take(which)
+        cursor[live] += size
+        live = live[cursor.take(live) < end.take(live)]
+        size = min(2 * size, PAIRS)

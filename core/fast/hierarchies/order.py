@@ -13,7 +13,7 @@ LAST = 2047
 def order_of(primitives, order, seed):
     """Numbers of primitives: as in the scene, sorted along a space-filling curve, or shuffled."""
     if order == "sorted":
-        return np.argsort(_codes(primitives.lo, primitives.hi), kind="stable").tolist()
+        return np.argsort(codes(primitives.lo, primitives.hi), kind="stable").tolist()
     numbers = list(range(primitives.n))
     if order == "shuffled":
         # Python's own generator, as in the pure core: the same seed is the same order.
@@ -21,7 +21,7 @@ def order_of(primitives, order, seed):
     return numbers
 
 
-def _codes(lo, hi):
+def codes(lo, hi):
     """Places on a Morton curve, in double precision (the builders' own codes are made from boxes in single precision)."""
     least, most = lo.min(axis=0), hi.max(axis=0)
     middle = 0.5 * least + 0.5 * most
