@@ -54,7 +54,7 @@ def test_packets_go_below_the_root(monkeypatch):
 @pytest.mark.parametrize("name", list(BY_NAME))
 def test_awkward_rays_in_packets(name, monkeypatch):
     monkeypatch.setattr(packets, "FEW", 1)
-    monkeypatch.setattr(packets, "SPREAD", 8.0)  # as far down as the scene is deep
+    monkeypatch.setattr(packets, "GROWTH", 8.0)  # as far down as the scene is deep
     scene = BY_NAME[name].scene(0)
     o, d, t_min, t_max = BY_NAME[name].rays(scene, 0)
     got = build(scene, "bvh").closest(o, d, t_min=t_min, t_max=t_max)

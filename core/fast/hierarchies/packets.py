@@ -2,20 +2,24 @@
 
 A packet is a run of rays. Its bounds on origins and reciprocals give bounds on where any of its rays enters and leaves a box:
 rounding is monotonic, so what is calculated from the bounds bounds what is calculated from each ray. Packets of rays that
-belong together reach small boxes at a fraction of the cost; others spread over the tree at once, and are broken up there.
+belong together reach small boxes at a fraction of the cost, and smaller packets go on from there; others spread over the
+tree at once, and are broken up where they do.
 """
 
 import numpy as np
 
-#: Rays of a packet.
-PACKET = 32
-#: Nodes a packet at which packets are broken up: more would be tested for rays that do not meet them than was saved above.
-SPREAD = 2.0
+from .slabs import four, meet
+
+#: Rays of a packet, the largest first; each is a multiple of the next.
+PACKETS = (64, 16)
+#: Packets are broken up where the next level of the tree has so many more nodes for each of them: a ray, too, meets about
+#: one node a level, and what is met by the packet only costs all of its rays one more.
+GROWTH = 0.8
 #: Rays for which it is not worth while.
 FEW = 2_048
 
 
-def descend(tree, unit, near, far, limit, alive):
+def descend(tree, unit, near, far, limit, alive, room):
     """Take packets down the tree.
 
     Parameters
@@ -28,6 +32,7 @@ def descend(tree, unit, near, far, limit, alive):
         Far ends of the rays.
     alive : ndarray
         The rays, by number.
+    room : Room
 
     Returns
     -------
@@ -36,40 +41,64 @@ def descend(tree, unit, near, far, limit, alive):
     """
     if len(alive) < FEW:
         return alive, np.zeros(len(alive), np.int64), np.zeros(len(alive), np.float32)
-    start = np.arange(0, len(alive), PACKET)
-    size = np.diff(start, append=len(alive))
-    bounds = []
-    for axis in range(3):
-        o, inverse = (unit.lines[k].take(alive).view(np.float32)[::4] for k in (axis, axis + 3))
-        o_lo, o_hi = np.minimum.reduceat(o, start), np.maximum.reduceat(o, start)
-        # The planes come first from the far end of the origins.
-        first, last = (o_hi, o_lo) if near[axis] < 3 else (o_lo, o_hi)
-        bounds.append((first, last, np.minimum.reduceat(inverse, start), np.maximum.reduceat(inverse, start)))
-    reach = np.maximum.reduceat(limit.take(alive), start)
-    packet, node = np.arange(len(start)), np.zeros(len(start), np.int64)
-    entry = np.zeros(len(start), np.float32)
-    done = []
-    while len(packet):
-        nearest, furthest = np.zeros((len(packet), 4), np.float32), np.repeat(reach[packet, None], 4, axis=1)
-        for axis, (first, last, least, most) in enumerate(bounds):
-            least, most = least[packet, None], most[packet, None]
-            a = tree.lines.take(node + near[axis]).view(np.float32).reshape(-1, 4) - first[packet, None]
-            b = tree.lines.take(node + far[axis]).view(np.float32).reshape(-1, 4) - last[packet, None]
-            np.maximum(nearest, np.minimum(a * least, a * most), out=nearest)
-            np.minimum(furthest, np.maximum(b * least, b * most), out=furthest)
-        child = tree.children(node)
-        met = nearest <= furthest
-        # A node with a leaf that is met is left to the rays: testing its primitive with all of them would be too much.
-        stops = (met & (child < 0)).any(axis=1)
-        row, slot = np.nonzero(met & ~stops[:, None])
-        if sum(len(d[0]) for d in done) + np.count_nonzero(stops) + len(row) > SPREAD * len(start):
-            break
-        done.append((packet[stops], node[stops], entry[stops]))
-        packet, node, entry = packet[row], child[row, slot].astype(np.int64), nearest[row, slot]
-    packet, node, entry = (np.concatenate(column) for column in zip(*done, (packet, node, entry)))
+    packet = node = np.zeros(1, np.int64)
+    entry = np.zeros(1, np.float32)
+    # One packet of all rays stands for the beginning.
+    rays = -(-len(alive) // PACKETS[0]) * PACKETS[0]
+    for size, bounds in zip(PACKETS, _bounds(unit, limit, alive)):
+        packet, node, entry = _divide(packet, node, entry, rays // size, len(bounds[-1]))
+        packet, node, entry = _down(tree, near, far, bounds, packet, node, entry, room)
+        rays = size
     order = np.argsort(-entry, kind="stable")
     packet, node, entry = packet[order], node[order], entry[order]
-    n = size[packet]
+    start = packet * size
+    n = np.minimum(start + size, len(alive)) - start
     ends = np.cumsum(n)
-    place = np.repeat(start[packet] - (ends - n), n) + np.arange(ends[-1] if len(ends) else 0)
+    place = np.repeat(start - (ends - n), n) + np.arange(ends[-1] if len(ends) else 0)
     return alive[place], np.repeat(node, n), np.repeat(entry, n)
+
+
+def _bounds(unit, limit, alive):
+    """For each size of packets their least and greatest origins and reciprocals (6 arrays each), and greatest limits."""
+    values = [line.take(alive).view(np.float32)[::4] for line in unit.lines]
+    least = most = values
+    reach, previous, found = limit.take(alive), 1, []
+    for size in reversed(PACKETS):
+        start = np.arange(0, len(reach), size // previous)
+        least, most = [np.minimum.reduceat(v, start) for v in least], [np.maximum.reduceat(v, start) for v in most]
+        reach, previous = np.maximum.reduceat(reach, start), size
+        found.append((least, most, reach))
+    return found[::-1]
+
+
+def _divide(packet, node, entry, parts, n):
+    """Packets divided into as many parts each; there are n in all."""
+    packet = (packet[:, None] * parts + np.arange(parts)).ravel()
+    used = np.flatnonzero(packet < n)
+    return packet[used], np.repeat(node, parts)[used], np.repeat(entry, parts)[used]
+
+
+def _down(tree, near, far, bounds, packet, node, entry, room):
+    """Take packets of one size down as far as they hold together."""
+    least, most, reach = bounds
+    planes = []
+    for axis in range(3):
+        # For positive directions the near plane comes first from the far end of the origins; a reciprocal of the least
+        # size makes it nearest. A product on the wrong side of 0 does not matter: entries are at least 0.
+        ends = (most[axis], least[axis], least[axis + 3], most[axis + 3])
+        planes.append([four(v) for v in (ends if near[axis] < 3 else (ends[1], ends[0], ends[3], ends[2]))])
+    limit = four(reach)
+    done = []
+    while len(packet):
+        slot, child, nearest = meet(tree.lines, node, near, far, planes, packet, limit, room)
+        row = slot >> 2
+        # A node with a leaf that is met is left to the rays: testing its primitive with all of them would be too much.
+        stops = np.zeros(len(packet), bool)
+        stops[row[child < 0]] = True
+        goes = np.flatnonzero(~stops.take(row))
+        if np.count_nonzero(stops) + len(goes) - len(packet) > GROWTH * len(reach):
+            break
+        done.append((packet[stops], node[stops], entry[stops]))
+        row = row.take(goes)
+        packet, node, entry = packet.take(row), child.take(goes).astype(np.int64), nearest.take(goes)
+    return tuple(np.concatenate(column) for column in zip(*done, (packet, node, entry)))

@@ -1,9 +1,6 @@
 """A binary tree packed four-wide, and its traversal by lists of (ray, node) pairs.
 
-One node is eight lines of sixteen bytes: the low and high edges of its four children's boxes, an axis a line, then the
-children's numbers. The tree is one flat array of such lines (complex128, only because that is numpy's sixteen-byte
-number), so that one ``take`` fetches four floats. Rays are kept four times over in the same way; all arithmetic then
-runs on contiguous arrays.
+The tree is one flat array of the lines that :mod:`.slabs` describes.
 
 All boxes are in unit space, grown by `PAD`: that covers every rounding of the float32 traversal (the ray's origin, once
 moved to where it enters the scene, is off by at most half an ulp of 1; the distance to a plane, at most 2, is off by
@@ -14,6 +11,7 @@ import numpy as np
 
 from .build_ploc import spread
 from .packets import descend
+from .slabs import CHILD, LINES, Room, four, meet
 from .tree import half_area
 
 #: In unit space: 2**-24 for the origin, 2 x 3 x 2**-24 for the distance, doubled.
@@ -28,9 +26,6 @@ LEAVES = 8_192
 #: Levels of the packed tree at which a ray's nearest child is taken up before the others. Measured: below, finding the
 #: nearest costs more than it saves, because boxes are small and a whole chunk is done before the next.
 ORDERED_LEVELS = 3
-
-LINES = 8
-CHILD = 6
 
 
 class WideTree:
@@ -65,10 +60,6 @@ class WideTree:
         # Wide nodes are numbered in the order in which _collapse lists inner children.
         number[inner] = (1 + np.arange(int(inner.sum()))) * LINES
         table.view(np.int32)[:, CHILD] = np.where(empty, 0, number)
-
-    def children(self, node):
-        """Children's numbers, shape (n, 4), of nodes given by their first lines."""
-        return self.lines.take(node + CHILD).view(np.int32).reshape(-1, 4)
 
     @property
     def nbytes(self):
@@ -120,7 +111,7 @@ class UnitRays:
         order = self.order = along_curve(o)
         o, inverse, self.start, self.end = o.take(order, axis=1), inverse.take(order, axis=1), self.start[order], self.end[order]
         #: Lines of x, y, z origins, then reciprocals; the far end is kept apart, since it changes.
-        self.lines = [_four(a) for a in (*o, *inverse)]
+        self.lines = [four(a) for a in (*o, *inverse)]
 
     def limit(self, t, ray=slice(None)):
         """Distances t of some rays as float32 distances from their starts, rounded up."""
@@ -144,18 +135,14 @@ def along_curve(o):
     return (code & np.uint64(2**31 - 1)).astype(np.int64)
 
 
-def _four(values):
-    """Each value four times over, as float32 in one sixteen-byte number."""
-    return np.repeat(values.astype(np.float32), 4).view(np.complex128)
-
-
 def traverse(tree, frame, rays, query):
     """Find the leaves that rays meet and hand their primitives to the query."""
     # By the sign bit: the reciprocal of -0.0 counts as negative, too.
     sign = np.signbit(rays.d)
     octant = sign[0] + 2 * sign[1] + 4 * sign[2]
+    room = Room()
     for o in np.flatnonzero(np.bincount(octant, minlength=8)):
-        _Octant(tree, frame, rays, query, np.flatnonzero(octant == o), int(o)).run()
+        _Octant(tree, frame, rays, query, np.flatnonzero(octant == o), int(o), room).run()
 
 
 class _Octant:
@@ -165,8 +152,8 @@ class _Octant:
     children are put on top of it: so the traversal goes front to back, roughly, without small arrays.
     """
 
-    def __init__(self, tree, frame, rays, query, index, octant):
-        self.tree, self.query = tree, query
+    def __init__(self, tree, frame, rays, query, index, octant, room):
+        self.tree, self.query, self.room = tree, query, room
         unit = UnitRays(frame, rays.take(index))
         index = index[unit.order]
         alive = np.flatnonzero((unit.start <= unit.end) & (unit.start * frame.size <= query.t[index]))
@@ -175,10 +162,11 @@ class _Octant:
         self.near = [a + 3 * s for a, s in enumerate(signs)]
         self.far = [a + 3 - 3 * s for a, s in enumerate(signs)]
         self.limit = unit.limit(query.t[index])
-        self.limit4 = _four(self.limit)
+        self.limit4 = four(self.limit)
+        self.planes = [(o, o, reciprocal, reciprocal) for o, reciprocal in zip(unit.lines[:3], unit.lines[3:])]
         # Counts are those of each ray by itself; what packets share would depend on the order of the rays.
         if query.counts is None:
-            pairs = descend(tree, unit, self.near, self.far, self.limit, alive)
+            pairs = descend(tree, unit, self.near, self.far, self.limit, alive, room)
         else:
             pairs = alive, np.zeros(len(alive), np.int64), np.zeros(len(alive), np.float32)
         self.levels = [[pairs]] if len(pairs[0]) else []
@@ -206,35 +194,15 @@ class _Octant:
             return
         if self.query.counts:
             self.query.counts.steps(self.index[ray])
-        lines = self.tree.lines
-        near = far = None
-        for axis in range(3):
-            o = self.unit.lines[axis].take(ray).view(np.float32)
-            inverse = self.unit.lines[axis + 3].take(ray).view(np.float32)
-            a = lines.take(node + self.near[axis]).view(np.float32)
-            a -= o
-            a *= inverse
-            b = lines.take(node + self.far[axis]).view(np.float32)
-            b -= o
-            b *= inverse
-            if near is None:
-                near, far = a, b
-            else:
-                np.maximum(near, a, out=near)
-                np.minimum(far, b, out=far)
-        np.maximum(near, np.float32(0.0), out=near)
-        np.minimum(far, self.limit4.take(ray).view(np.float32), out=far)
-        slot = np.flatnonzero(near <= far)
-        child = lines.take(node + CHILD).view(np.int32).take(slot)
-        near = near.take(slot)
+        slot, child, entry = meet(self.tree.lines, node, self.near, self.far, self.planes, ray, self.limit4, self.room)
         ray = ray.take(slot >> 2)
         leaf = np.flatnonzero(child < 0)
         if len(leaf):
             self.collect(ray.take(leaf), ~child.take(leaf))
             inner = np.flatnonzero(child >= 0)
-            ray, child, near = ray.take(inner), child.take(inner), near.take(inner)
+            ray, child, entry = ray.take(inner), child.take(inner), entry.take(inner)
         if len(ray):
-            self.push(level + 1, ray, child.astype(np.int64), near)
+            self.push(level + 1, ray, child.astype(np.int64), entry)
 
     def push(self, level, ray, node, entry):
         """Put pairs on a level, at the upper levels with the nearest child of every ray on top."""
@@ -291,4 +259,4 @@ class _Octant:
         self.query.test(self.index[ray], item)
         limit = self.unit.limit(self.query.t[self.index[ray]], ray)
         self.limit[ray] = limit
-        self.limit4[ray] = _four(limit)
+        self.limit4[ray] = four(limit)
