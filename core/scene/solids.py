@@ -39,7 +39,9 @@ class Kind:
 _IDENTITY = np.eye(4)
 _SQUARE = [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)]
 BOX_CORNERS = [(x, y, z) for z in (-1.0, 1.0) for x, y in _SQUARE]
+BOX_EDGES = [(k, (k + 1) % 4) for k in range(4)] + [(4 + k, 4 + (k + 1) % 4) for k in range(4)] + [(k, k + 4) for k in range(4)]
 PYRAMID_CORNERS = [(x, y, 0.0) for x, y in _SQUARE] + [(0.0, 0.0, 1.0)]
+PYRAMID_EDGES = [(k, (k + 1) % 4) for k in range(4)] + [(k, 4) for k in range(4)]
 
 KINDS = {k.name: k for k in (
     Kind("sphere", "the unit sphere about the origin"),

@@ -7,6 +7,7 @@ import pytest
 
 from rayscope.core import Mesh, Scene, SceneError, build, solids
 from rayscope.core.fast.primitives import Primitives
+from rayscope.core.pure.primitives import primitives_of
 from rayscope.core.scene.csg import flatten, s_bounds
 from rayscope.core.scene.scene import Object, Shapes
 
@@ -229,6 +230,61 @@ def test_bounds_and_support_hold_all_that_is_left():
         assert ((p @ axis.T >= low) & (p @ axis.T <= high)).all()
         lo, hi = np.array(solids.bounds(tree))
         assert (p >= lo - 1e-12).all() and (p <= hi + 1e-12).all()
+
+
+def test_boxes_of_parts_hold_them_and_are_the_same_in_both_cores():
+    tightened, held = 0, 0
+    for seed in (2, 3, 5, 14, 17, 28, 37, 38):
+        rng = np.random.default_rng(seed)
+        tree = random_tree(rng, 3)
+        scene = Scene(solids=[tree])
+        fast, (pure,) = Primitives.of(scene, None), primitives_of(scene, None)
+        kind, = fast.kinds
+        np.testing.assert_array_equal((fast.lo, fast.hi), ([pure.lo], [pure.hi]))
+        p = rng.uniform(-2.5, 2.5, (40_000, 3))
+        p = p[within(tree, p)]
+        middle, half = rng.uniform(fast.lo[0], fast.hi[0], (30, 3)), rng.uniform(0.02, 0.4, (30, 3))
+        lo, hi, item = middle - half, middle + half, np.zeros(30, int)
+        own_lo, own_hi = kind.clip(item, lo, hi)
+        touches = kind.overlaps(item, lo, hi)
+        for k in range(30):
+            box = lo[k].tolist(), hi[k].tolist()
+            assert pure.overlaps(*box) == touches[k]
+            np.testing.assert_array_equal(pure.clip(*box), (own_lo[k], own_hi[k]))
+            own = p[((p >= lo[k]) & (p <= hi[k])).all(axis=1)]
+            assert not len(own) or touches[k]
+            assert (own >= own_lo[k]).all() and (own <= own_hi[k]).all()
+        tightened += (~touches).sum()
+        corners, alone = kind.inscribed_box(item[:1])[0], pure.inscribed_box()
+        if alone is None:
+            assert np.isnan(corners).all()
+            continue
+        np.testing.assert_array_equal(corners, alone)
+        assert within(tree, rng.uniform(corners[0], corners[7], (2000, 3))).all() and (corners[7] > corners[0]).all()
+        held += 1
+    assert tightened > 20 and held > 3
+
+
+@pytest.mark.parametrize("core", CORES)
+def test_a_lens_has_a_box_that_fits(core):
+    """Narrower than both of its spheres' boxes, and a part that is cut away has none."""
+    lens = solids.intersection(solids.sphere((0, 0, -0.5), 1), solids.sphere((0, 0, 0.5), 1))
+    bite = solids.difference(solids.box((-1, -1, -1), (1, 1, 1)), solids.box((-3, -3, -0.1), (3, 3, 3)))
+    scene = Scene(solids=[lens, bite])
+    if core == "fast":
+        own = Primitives.of(scene, None)
+        lo, hi = own.lo.tolist(), own.hi.tolist()
+        low, high = own.support(np.zeros(1, int), np.array([[1.0, 1.0, 0.0]]))
+    else:
+        own = primitives_of(scene, None)
+        lo, hi = [p.lo for p in own], [p.hi for p in own]
+        low, high = own[0].support((1.0, 1.0, 0.0))
+    rim = math.sqrt(0.75)
+    assert lo[0] == pytest.approx((-rim, -rim, -0.5), abs=1e-5) and hi[0] == pytest.approx((rim, rim, 0.5), abs=1e-5)
+    # To a quarter of its height.
+    assert hi[1] == pytest.approx((1, 1, 0), abs=1e-5)
+    # Diagonally, the lens reaches sqrt(2) rim; its spheres reach sqrt(2).
+    assert math.sqrt(2) * rim <= high < 1.05 * math.sqrt(2) and low == pytest.approx(-high)
 
 
 @pytest.mark.parametrize("core", CORES)

@@ -305,6 +305,54 @@ def test_overlaps_tells_apart_what_is_apart(name):
     assert touches[~apart].any()
 
 
+QUARTER = np.array([[1, -1, 0, 0], [1, 1, 0, 0], [0, 0, math.sqrt(2), 0], [0, 0, 0, math.sqrt(2)]]) / math.sqrt(2)
+CUTS = [
+    # (solid, matrix, box, box of what is inside)
+    ("sphere", np.eye(4), ((0.8, -9, -9), (9, 9, 9)), ((0.8, -0.6, -0.6), (1, 0.6, 0.6))),
+    ("sphere", np.diag([2.0, 1.0, 3.0, 1.0]), ((-9, 0.6, -9), (9, 9, 9)), ((-1.6, 0.6, -2.4), (1.6, 1, 2.4))),
+    ("sphere", QUARTER @ np.diag([2.0, 1.0, 1.0, 1.0]), ((-9, -9, 0.6), (9, 9, 9)), ((-0.8 * 2.5**0.5, -0.8 * 2.5**0.5, 0.6), (0.8 * 2.5**0.5, 0.8 * 2.5**0.5, 1))),
+    ("box", QUARTER, ((1, -9, -9), (9, 9, 0.5)), ((1, 1 - 2**0.5, -1), (2**0.5, 2**0.5 - 1, 0.5))),
+    # The box's corner within the solid.
+    ("box", QUARTER, ((0.1, 0.2, 0.3), (9, 9, 9)), ((0.1, 0.2, 0.3), (2**0.5 - 0.2, 2**0.5 - 0.1, 1))),
+    ("pyramid", np.eye(4), ((-9, -9, 0.75), (9, 9, 9)), ((-0.25, -0.25, 0.75), (0.25, 0.25, 1))),
+    ("pyramid", np.eye(4), ((0.5, -9, -9), (9, 9, 9)), ((0.5, -1, 0), (1, 1, 0.5))),
+    ("cone", np.eye(4), ((-9, -9, 0.75), (9, 9, 9)), ((-0.25, -0.25, 0.75), (0.25, 0.25, 1))),
+    ("frustum", np.eye(4), ((-9, -9, 0.8), (9, 9, 9)), ((-0.5, -0.5, 0.8), (0.5, 0.5, 1))),
+    ("cylinder", np.eye(4), ((-9, -9, 0.25), (9, 9, 0.5)), ((-1, -1, 0.25), (1, 1, 0.5))),
+    # Along the diagonal, 0.01 thick.
+    ("cylinder", np.array([[0.01, 0, 4, 0], [0, 0.01, 4, 0], [-0.01, -0.01, 4, 0], [0, 0, 0, 1]]), ((1, -9, -9), (2, 9, 9)), ((1, 0.97, 0.97), (2, 2.03, 2.03))),
+]
+
+
+@pytest.mark.parametrize("name, matrix, box, part", CUTS)
+def test_clipped_parts_are_tight(name, matrix, box, part):
+    scene = unit_scene(name, matrix)
+    fast, (pure,) = Primitives.of(scene, None), primitives_of(scene, None)
+    for lo, hi in ([c[0] for c in fast.clip(np.zeros(1, int), *np.array(box, float)[:, None])], pure.clip(*(tuple(map(float, c)) for c in box))):
+        np.testing.assert_allclose(lo, part[0], atol=1e-5 if abs(matrix[0, 0]) > 0.1 else 0.02)
+        np.testing.assert_allclose(hi, part[1], atol=1e-5 if abs(matrix[0, 0]) > 0.1 else 0.02)
+
+
+@pytest.mark.parametrize("name", [*CLOSED, *OPEN])
+def test_boxes_said_to_be_held_are(name):
+    rng = np.random.default_rng(72)
+    found = 0
+    for matrix in (np.eye(4), *(affine(rng) for _ in range(4))):
+        scene = unit_scene(name, matrix)
+        kind, pure = Primitives.of(scene, None).kinds[0], primitives_of(scene, None)[0]
+        middle = (rng.uniform(-1, 1, (60, 3)) * (1, 1, 0.5) + (0, 0, 0.3)) @ matrix[:3, :3].T + matrix[:3, 3]
+        half = rng.uniform(0.0, 0.1, (60, 3))
+        lo, hi = middle - half, middle + half
+        held = kind.holds(np.zeros(60, int), lo, hi)
+        assert [pure.holds(a, b) for a, b in zip(lo.tolist(), hi.tolist())] == held.tolist()
+        found += held.sum()
+        back = exact_inverse(matrix)
+        for k in np.flatnonzero(held):
+            corners = [np.where([c & 1, c >> 1 & 1, c >> 2], hi[k], lo[k]) for c in range(8)]
+            assert all(CLOSED[name][1](*back(exact(p))) <= 0 for p in corners)
+    assert found == 0 if name in OPEN else 20 < found < 290
+
+
 @pytest.mark.parametrize("radius", [1e-8, 1e-3, 1.0, 1e8])
 def test_spheres_of_any_size_from_any_distance(radius):
     rng = np.random.default_rng(61)

@@ -14,9 +14,11 @@ A kind is one file with one class. Its objects hold n primitives of the kind as 
 ``overlaps(item, lo, hi)``
     Bool per pair: whether the primitive reaches into the box; conservative: touching counts.
 ``clip(item, lo, hi)``
-    Boxes (lo, hi) of the parts of primitives inside the boxes given; empty (lo > hi) where nothing is inside.
+    Boxes (lo, hi) of the parts of primitives inside the boxes given; empty (lo > hi) where nothing is inside. Exact for
+    triangles, polygons, boxes and pyramids; never too small for spheres (exact where one side of the box cuts at a time),
+    cylinders and cones (cut along their axes), combinations, and instances (their boxes).
 ``support(item, axis)``
-    Exact extent (d, D) of primitives along the directions given, shape (n, 3).
+    Extent (d, D) of primitives along the directions given, shape (n, 3): exact; of combinations never too small.
 
 and may offer ``outline(item)``, the corners of convex polygons, shape (m, 3, 3), ``inscribed_box(item)``, the corners, shape (m, 8, 3), of boxes
 such that what passes through one meets the primitive (NaN where there is none), and ``blocks(rays, ray, item, t_far)``, the pairs that hit,

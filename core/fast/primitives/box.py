@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ...scene.solids import BOX_CORNERS
+from ...scene.solids import BOX_CORNERS, BOX_EDGES
 from .polytope import Polytopes
 
 
@@ -12,7 +12,7 @@ class Boxes(Polytopes):
     KIND = "box"
     PLANES = (((-1.0, 0.0, 0.0), 1.0), ((1.0, 0.0, 0.0), 1.0), ((0.0, -1.0, 0.0), 1.0), ((0.0, 1.0, 0.0), 1.0),
               ((0.0, 0.0, -1.0), 1.0), ((0.0, 0.0, 1.0), 1.0))
-    CORNERS = BOX_CORNERS
+    CORNERS, EDGES = BOX_CORNERS, BOX_EDGES
 
     def project(self, p, face, item):
         p = np.clip(p, -1.0, 1.0)

@@ -92,6 +92,14 @@ class ClosedMesh:
         along = axis @ self.triangles.xyz.reshape(3, 3, -1).transpose(1, 0, 2).reshape(3, -1)
         return along.min(axis=1), along.max(axis=1)
 
+    def clip(self, item, lo, hi):
+        """Boxes of the parts inside boxes, by the mesh's own box."""
+        return np.maximum(self.lo, lo), np.minimum(self.hi, hi)
+
+    def holds(self, item, lo, hi):
+        """Whether boxes lie within, for certain: that is not found out."""
+        return np.zeros(len(lo), bool)
+
 
 class _All:
     """A query that collects every crossing."""

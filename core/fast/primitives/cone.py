@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from .solids import UnitShapes
+from .solids import EPSILON, UnitShapes
 
 #: Faces.
 SIDE, BASE, TOP = 0, 1, 2
@@ -121,3 +121,22 @@ class Cones(UnitShapes):
         top = w[2] + self.ratio[item] * across > across
         scale = np.where(top, self.ratio[item], 1.0) / np.where(across > 0.0, across, 1.0)
         return np.stack([w[0] * scale, w[1] * scale, np.where(top, 1.0, 0.0)])
+
+    def shrink(self, item, lo, hi):
+        """The box leaves of the axis only heights whose discs reach into it: what is around these is the frustum between two."""
+        m, c, k = self.matrix[:, :, item], self.origin[:, item], self.k[item]
+        radius = np.sqrt(m[:, 0] * m[:, 0] + m[:, 1] * m[:, 1])
+        slack = 64 * EPSILON * (np.abs(c) + np.abs(m[:, 2]) + radius + np.maximum(np.abs(lo), np.abs(hi)))
+        begin, end = np.zeros(len(item)), np.ones(len(item))
+        for a in range(3):
+            # Discs reach from c + m z - r (1 - k z) to c + m z + r (1 - k z).
+            for room, slope in ((c[a] + radius[a] - lo[a] + slack[a], m[a, 2] - k * radius[a]), (hi[a] - c[a] + radius[a] + slack[a], -m[a, 2] - k * radius[a])):
+                with np.errstate(all="ignore"):
+                    z = -room / slope
+                begin = np.where(slope > 0.0, np.maximum(begin, z - 8 * EPSILON), begin)
+                end = np.where(slope < 0.0, np.minimum(end, z + 8 * EPSILON), end)
+        first, second = c + m[:, 2] * begin, c + m[:, 2] * end
+        wide, narrow = radius * (1.0 - k * begin), radius * (1.0 - k * end)
+        low, high = np.minimum(first - wide, second - narrow) - slack, np.maximum(first + wide, second + narrow) + slack
+        nothing = begin > end
+        return np.maximum(lo, np.where(nothing, np.inf, low)), np.minimum(hi, np.where(nothing, -np.inf, high))

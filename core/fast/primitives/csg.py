@@ -22,6 +22,10 @@ EPSILON = 2.0**-52
 #: A crossing's number: leaf, then whether its normal is turned round, then face or triangle.
 LEAF, TURNED = 41, 40
 FACE = (1 << TURNED) - 1
+#: Times that a box around a combination is cut into eighths.
+CUTS = 2
+#: Times that a step by which an inscribed box grows is halved.
+STEPS = 5
 _UNION, _DIFFERENCE = OPERATIONS.index(UNION), OPERATIONS.index(DIFFERENCE)
 
 
@@ -80,6 +84,8 @@ class Trees:
         Each node's parent, whether it is the second operand there, its distance from the root, and its leaf's number.
     low, high : ndarray, shape (3, nodes)
         S-bounds, grown by what rounding of the boxes may do.
+    cover : list
+        Of each tree, small boxes (lo, hi) that hold it.
     root, first_leaf : ndarray, shape (n,)
     prune : ndarray, shape (n,), bool
     """
@@ -98,8 +104,17 @@ class Trees:
         self.object_of = np.array([t.object for t in self.trees], np.int32)
         self.primitive_of = np.array([t.primitive for t in self.trees], np.int64)
         self.prune = np.array([t.prune for t in self.trees], bool)
-        self.lo, self.hi = (np.array([b[-1][end] for b in boxes]).reshape(-1, 3) for end in (0, 1))
         self._number_nodes()
+        self._box(boxes)
+        #: Small boxes that hold each combination.
+        self.cover = [self._cover(k) for k in range(self.n)]
+        self.lo, self.hi = (np.array([f(c[end], axis=0) for c in self.cover]).reshape(-1, 3) for end, f in ((0, np.min), (1, np.max)))
+        for box, lo, hi in zip(boxes, self.lo.tolist(), self.hi.tolist()):
+            box[-1] = tuple(lo), tuple(hi)
+        self._box(boxes)
+
+    def _box(self, boxes):
+        """Take over the boxes of all nodes."""
         low, high = (np.array([node[end] for b in boxes for node in b]).reshape(-1, 3).T for end in (0, 1))
         self.empty = low[0] > high[0]
         slack = np.where(self.empty, 0.0, 64 * EPSILON * np.maximum(np.abs(low), np.abs(high)))
@@ -257,7 +272,7 @@ class Trees:
         return self.object_of[item], self.primitive_of[item], (number >> LEAF).astype(np.int32), normal, point, error
 
     def support(self, item, axis):
-        """Extents (d, D) along directions, never too small: those of the boxes and of what operands leave."""
+        """Extents (d, D) along directions, never too small: what both the operands and the cover leave."""
         low, high = np.empty(len(item)), np.empty(len(item))
         for k in np.unique(item):
             at = np.flatnonzero(item == k)
@@ -271,15 +286,110 @@ class Trees:
                 (l, h), (l1, h1) = (done[c] for c in operands)
                 done.append({UNION: (np.minimum(l, l1), np.maximum(h, h1)), INTERSECTION: (np.maximum(l, l1), np.minimum(h, h1)),
                              DIFFERENCE: (l, h)}[op])
-            ends = a * self.lo[k], a * self.hi[k]
-            low[at] = np.maximum(done[-1][0], np.minimum(*ends).sum(axis=1))
-            high[at] = np.minimum(done[-1][1], np.maximum(*ends).sum(axis=1))
+            ends = [a[:, None] * c for c in self.cover[k]]
+            low[at] = np.maximum(done[-1][0], np.minimum(*ends).sum(axis=2).min(axis=1))
+            high[at] = np.minimum(done[-1][1], np.maximum(*ends).sum(axis=2).max(axis=1))
         return low, high
 
     def overlaps(self, item, lo, hi):
-        """Bool per pair: whether the combination may touch the box, by its operands' boxes."""
-        return ((self.lo[item] <= hi) & (self.hi[item] >= lo)).all(axis=1)
+        """Bool per pair: whether the combination may touch the box: where :meth:`clip` leaves anything."""
+        own_lo, own_hi = self.clip(item, lo, hi)
+        return (own_lo <= own_hi).all(axis=1)
 
     def clip(self, item, lo, hi):
-        """Boxes of the parts inside boxes, by the combinations' own boxes."""
-        return np.maximum(self.lo[item], lo), np.minimum(self.hi[item], hi)
+        """Boxes of the parts inside boxes, from those of the operands' parts; never too small."""
+        low, high = np.full(lo.shape, np.inf), np.full(lo.shape, -np.inf)
+        for k in np.unique(item):
+            at = np.flatnonzero(item == k)
+            low[at], high[at] = self._part(k, self.root[k], lo[at], hi[at])
+        return low, high
+
+    def _part(self, k, node, lo, hi):
+        """Boxes of the parts of a node inside boxes; S-bounds tell what does not matter."""
+        lo, hi = np.maximum(lo, self.low.T[node]), np.minimum(hi, self.high.T[node])
+        low, high = np.full(lo.shape, np.inf), np.full(lo.shape, -np.inf)
+        at = np.flatnonzero((lo <= hi).all(axis=1))
+        if not len(at):
+            return low, high
+        lo, hi, op = lo[at], hi[at], self.op[node]
+        if op < 0:
+            kind, own = self.leaves.of(self.first_leaf[k] + self.leaf[node])
+            low[at], high[at] = kind.clip(np.full(len(at), own), lo, hi)
+            return low, high
+        low[at], high[at] = self._part(k, self.left[node], lo, hi)
+        if op == _UNION:
+            other = self._part(k, self.right[node], lo, hi)
+            low[at], high[at] = np.minimum(low[at], other[0]), np.maximum(high[at], other[1])
+            return low, high
+        at = at[(low[at] <= high[at]).all(axis=1)]
+        if op == _DIFFERENCE:
+            gone = at[self._holds(k, self.right[node], low[at], high[at])]
+            low[gone], high[gone] = np.inf, -np.inf
+        else:
+            low[at], high[at] = self._part(k, self.right[node], low[at], high[at])
+        return low, high
+
+    def _holds(self, k, node, lo, hi):
+        """Bool per box: whether it lies within a node, for certain."""
+        op = self.op[node]
+        if op < 0:
+            kind, own = self.leaves.of(self.first_leaf[k] + self.leaf[node])
+            return kind.holds(np.full(len(lo), own), lo, hi)
+        inside = self._holds(k, self.left[node], lo, hi)
+        some = np.flatnonzero(~inside if op == _UNION else inside)
+        if len(some):
+            if op == _DIFFERENCE:
+                own_lo, own_hi = self._part(k, self.right[node], lo[some], hi[some])
+                inside[some] = (own_lo > own_hi).any(axis=1)
+            else:
+                inside[some] = self._holds(k, self.right[node], lo[some], hi[some])
+        return inside
+
+    def _cover(self, k):
+        """Boxes (lo, hi) that hold a combination: its box cut into eighths again and again, each then made to fit."""
+        root = self.root[k]
+        cover = self.low.T[root][None], self.high.T[root][None]
+        for _ in range(CUTS):
+            lo, hi = self._part(k, root, *_eighths(*cover))
+            there = (lo <= hi).all(axis=1)
+            if not there.any():
+                break
+            cover = lo[there], hi[there]
+        return cover
+
+    def inscribed_box(self, item):
+        """Corners, shape (m, 8, 3), of boxes within the combinations; NaN where none was found."""
+        found = {k: self._inscribed(k) for k in np.unique(item)}
+        lo, hi = (np.array([found[k][end] for k in item]).reshape(-1, 3) for end in (0, 1))
+        return np.stack([np.where([k & 1, k >> 1 & 1, k >> 2], hi, lo) for k in range(8)], axis=1)
+
+    def _inscribed(self, k):
+        """One combination's: the largest box of the cover that lies within, or of its eighths; then grown side by side."""
+        root, boxes = self.root[k], self.cover[k]
+        for _ in range(CUTS):
+            inside = self._holds(k, root, *boxes)
+            if inside.any():
+                break
+            boxes = _eighths(*boxes)
+        else:
+            return np.full((2, 3), np.nan)
+        lo, hi = boxes[0][inside], boxes[1][inside]
+        largest = np.prod(hi - lo, axis=1).argmax()
+        box = np.stack([lo[largest], hi[largest]])
+        for axis in range(3):
+            for side, limit in ((0, self.lo[k, axis]), (1, self.hi[k, axis])):
+                step = limit - box[side, axis]
+                for _ in range(STEPS):
+                    step *= 0.5
+                    grown = box.copy()
+                    grown[side, axis] += step
+                    if self._holds(k, root, grown[:1], grown[1:])[0]:
+                        box = grown
+        return box
+
+
+def _eighths(lo, hi):
+    """Boxes, each cut into eight."""
+    middle = 0.5 * (lo + hi)
+    pick = np.array([[k & 1, k >> 1 & 1, k >> 2] for k in range(8)], bool)[:, None]
+    return np.where(pick, middle, lo).reshape(-1, 3), np.where(pick, hi, middle).reshape(-1, 3)

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ...scene.solids import PYRAMID_CORNERS
+from ...scene.solids import PYRAMID_CORNERS, PYRAMID_EDGES
 from .polytope import Polytopes
 
 
@@ -12,7 +12,7 @@ class Pyramids(Polytopes):
     KIND = "pyramid"
     PLANES = (((-1.0, 0.0, 1.0), 1.0), ((1.0, 0.0, 1.0), 1.0), ((0.0, -1.0, 1.0), 1.0), ((0.0, 1.0, 1.0), 1.0),
               ((0.0, 0.0, -1.0), 0.0))
-    CORNERS = PYRAMID_CORNERS
+    CORNERS, EDGES = PYRAMID_CORNERS, PYRAMID_EDGES
 
     def project(self, p, face, item):
         z = np.where(face == 4, 0.0, np.clip(p[2], 0.0, 1.0))

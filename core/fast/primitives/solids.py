@@ -14,6 +14,10 @@ from ...scene.solids import place
 EPSILON = 2.0**-52
 #: Steps after which two shapes not yet proved to be apart count as touching.
 STEPS = 32
+#: Times that a box around a part of a shape is made smaller.
+ROUNDS = 2
+#: What rounding may do in unit space at most, where boxes are compared there; beyond 1/4 of it they are not.
+DOUBT = 2.0**-20
 
 #: Name of a kind -> (file in this folder, its class).
 CLASSES = {"sphere": ("sphere", "Spheres"), "box": ("box", "Boxes"), "cylinder": ("cylinder", "Cylinders"),
@@ -124,6 +128,10 @@ class UnitShapes:
 
     def inner(self, item):
         """Corners (lo, hi) of a large box within the unit shape, columns; NaN where a line through it need not meet the surface."""
+        raise NotImplementedError
+
+    def shrink(self, item, lo, hi):
+        """Boxes around the parts of the solids, their insides included, in world boxes (columns, shape (3, m)); never too small."""
         raise NotImplementedError
 
     # The same for all kinds.
@@ -256,6 +264,39 @@ class UnitShapes:
                          for r in range(3)], axis=-1).transpose(1, 0, 2)
 
     def clip(self, item, lo, hi):
-        """Boxes of the parts inside boxes, by the solids' own boxes; empty where a solid does not touch."""
-        touches = self.overlaps(item, lo, hi)[:, None]
-        return (np.where(touches, np.maximum(self.lo[item], lo), np.inf), np.where(touches, np.minimum(self.hi[item], hi), -np.inf))
+        """Boxes of the parts inside boxes, the solids' insides included; empty where a solid does not touch.
+
+        They are as tight as the kind's ``shrink`` tells: exact for polytopes; of round solids, wherever one side of the box
+        cuts at a time.
+        """
+        low, high = np.full(lo.shape, np.inf), np.full(lo.shape, -np.inf)
+        at = np.flatnonzero(self.overlaps(item, lo, hi))
+        item = item[at]
+        low[at], high[at] = np.maximum(self.lo[item], lo[at]), np.minimum(self.hi[item], hi[at])
+        certain = self._certain(item, low[at], high[at])
+        at, item = at[certain], item[certain]
+        for _ in range(ROUNDS):
+            low[at], high[at] = (c.T for c in self.shrink(item, low[at].T, high[at].T))
+            there = (low[at] <= high[at]).all(axis=1)
+            low[at[~there]], high[at[~there]] = np.inf, -np.inf
+            at, item = at[there], item[there]
+        return low, high
+
+    def _certain(self, item, lo, hi):
+        """Bool per pair: whether boxes, taken to unit space, are off by far less than its unit."""
+        size = (np.maximum(np.abs(lo), np.abs(hi)).T + np.abs(self.origin[:, item]))
+        w = np.abs(self.inverse[:, :, item])
+        return np.maximum.reduce([w[r, 0] * size[0] + w[r, 1] * size[1] + w[r, 2] * size[2] for r in range(3)]) * (16 * EPSILON) < 0.25 * DOUBT
+
+    def holds(self, item, lo, hi):
+        """Bool per pair: whether the box lies within the closed solid, for certain."""
+        origin, w = self.origin[:, item], self.inverse[:, :, item]
+        inside = self._certain(item, lo, hi)
+        # Seen from the middle of the inscribed box, corners are put a little further out.
+        middle = sum(self.inner(item)) * 0.5
+        for k in range(8):
+            corner = np.where([k & 1, k >> 1 & 1, k >> 2], hi, lo).T - origin
+            p = np.stack([w[r, 0] * corner[0] + w[r, 1] * corner[1] + w[r, 2] * corner[2] for r in range(3)])
+            with np.errstate(invalid="ignore"):
+                inside &= self.contains(p + DOUBT * (p - middle), item)
+        return inside

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from .solids import UnitShapes, dot, unit
+from .solids import DOUBT, EPSILON, UnitShapes, dot, unit
 
 
 class Spheres(UnitShapes):
@@ -49,3 +49,26 @@ class Spheres(UnitShapes):
 
     def furthest(self, w, item):
         return unit(w)
+
+    def shrink(self, item, lo, hi):
+        """One coordinate between limits leaves of each other one what the ellipse at the nearer limit to its greatest place has."""
+        m, c = self.matrix[:, :, item], self.origin[:, item]
+        square = {(a, b): dot(m[a], m[b]) for a in range(3) for b in range(a, 3)}
+        lo, hi = list(lo), list(hi)
+        for a in range(3):
+            aa = square[a, a]
+            reach = np.sqrt(aa)
+            for b in range(3):
+                if a == b:
+                    continue
+                ab, bb = square[min(a, b), max(a, b)], square[b, b]
+                slack = 64 * EPSILON * (np.abs(c[b]) + np.maximum(np.abs(lo[b]), np.abs(hi[b])))
+                low, high = lo[b] - c[b] - slack, hi[b] - c[b] + slack
+                slope, top = ab / bb, ab / reach
+                rest = np.sqrt(np.maximum(aa - slope * ab, 0.0))
+                slack = DOUBT * reach + 8 * EPSILON * np.abs(c[a])
+                for sign, side in ((1.0, hi), (-1.0, lo)):
+                    y = np.minimum(np.maximum(sign * top, low), high)
+                    most = slope * y + sign * (rest * np.sqrt(np.maximum(1.0 - y * y / bb, 0.0)) + slack)
+                    side[a] = (np.minimum if sign > 0.0 else np.maximum)(side[a], c[a] + most)
+        return np.stack(lo), np.stack(hi)

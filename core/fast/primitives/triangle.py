@@ -26,7 +26,7 @@ class Triangles:
     Attributes
     ----------
     xyz : ndarray, shape (9, n)
-        x, y, z of the first vertices, then of the second, then of the third.
+        x, y, z of the first vertices, then of the second, then of the third; the nine of a triangle stand together in memory.
     object_of, primitive_of : ndarray, shape (n,)
         Object in the scene and triangle in its mesh.
     flip : ndarray, shape (n,), bool
@@ -36,9 +36,11 @@ class Triangles:
     KIND = "triangle"
 
     def __init__(self, xyz, object_of, primitive_of, flip):
-        self.xyz, self.object_of, self.primitive_of, self.flip = xyz, object_of, primitive_of, flip
+        self.object_of, self.primitive_of, self.flip = object_of, primitive_of, flip
         self.n = xyz.shape[1]
-        self._flat = xyz.ravel()
+        # A triangle is fetched from one or two lines of the cache, not from nine.
+        self._flat = np.ascontiguousarray(xyz.T).ravel()
+        self.xyz = self._flat.reshape(self.n, 9).T
         self.flips = bool(flip.any())
         self._area = np.zeros(self.n, np.int8)                          # -1: none; 1: some; 0: not known yet
 
@@ -90,21 +92,17 @@ class Triangles:
         x, y, z = [], [], []
         sx, sy = s[0].take(ray), s[1].take(ray)
         ox, oy, oz = (origin[a].take(ray) for a in range(3))
-        if rays.main is not None:
-            rows = [[self.xyz[3 * vertex + axis] for axis in rays.main] for vertex in range(3)]
-            places = [[item] * 3] * 3
-        else:
-            flat, n = self._flat, self.n
-            own = [axes[a].take(ray) * n + item for a in range(3)]
-            rows = [[flat] * 3] * 3
-            places = [own, [k + 3 * n for k in own], [k + 6 * n for k in own]]
-        for row, (kx, ky, kz) in zip(rows, places):
-            w = row[2].take(kz)
+        first = item * 9
+        places = [first + k for k in rays.main] if rays.main is not None else [axes[a].take(ray) + first for a in range(3)]
+        flat = self._flat
+        for vertex in (0, 3, 6):
+            kx, ky, kz = (place + vertex for place in places) if vertex else places
+            w = flat.take(kz)
             w -= oz
-            p = row[0].take(kx)
+            p = flat.take(kx)
             p -= ox
             p -= sx * w
-            q = row[1].take(ky)
+            q = flat.take(ky)
             q -= oy
             q -= sy * w
             x.append(p)
@@ -164,7 +162,8 @@ class Triangles:
 
     def rows(self, item):
         """The columns of some triangles: nine arrays."""
-        return [row.take(item) for row in self.xyz]
+        first = item * 9
+        return [self._flat.take(first + k) for k in range(9)]
 
     def outline(self, item):
         """Corners, shape (m, 3, 3)."""
@@ -262,12 +261,13 @@ def interpolated(rows, u, v):
 def normals(rows, flip=None):
     """Unit normals (3, m) of triangles (nine rows) by their winding, turned where `flip`; 0 for those without area."""
     e, f = ([rows[axis + k] - rows[axis] for axis in range(3)] for k in (3, 6))
-    # Scaled by a power of two first, or the cross product of tiny edges underflows.
     size = np.abs(e[0])
     for edge in (*e[1:], *f):
         np.maximum(size, np.abs(edge), out=size)
-    shift = -np.frexp(size)[1]
-    e, f = ([np.ldexp(edge, shift) for edge in some] for some in (e, f))
+    if not 2.0**-200 < size.min(initial=1.0) <= size.max(initial=1.0) < 2.0**200:
+        # Scaled by a power of two first, or the cross product of tiny edges underflows.
+        shift = -np.frexp(size)[1]
+        e, f = ([np.ldexp(edge, shift) for edge in some] for some in (e, f))
     normal = np.stack([e[1] * f[2] - e[2] * f[1], e[2] * f[0] - e[0] * f[2], e[0] * f[1] - e[1] * f[0]])
     length = np.sqrt(normal[0] * normal[0] + normal[1] * normal[1] + normal[2] * normal[2])
     length[length == 0.0] = 1.0

@@ -3,7 +3,12 @@
 A kind is one file with one class, a :class:`Primitive`; each primitive is one object of it.
 """
 
+import math
+
 from ...scene.layout import Layout
+
+#: A box that holds nothing.
+NOWHERE = ((math.inf,) * 3, (-math.inf,) * 3)
 
 
 class Primitive:
@@ -46,7 +51,7 @@ class Primitive:
         raise NotImplementedError
 
     def support(self, axis):
-        """The exact extent (d, D) along a direction."""
+        """The extent (d, D) along a direction: exact; of combinations never too small."""
         raise NotImplementedError
 
 

@@ -1,6 +1,6 @@
 """The box, under any affine matrix: a parallelepiped."""
 
-from ...scene.solids import BOX_CORNERS
+from ...scene.solids import BOX_CORNERS, BOX_EDGES
 from .polytope import Polytope
 from .solids import clamp
 
@@ -11,7 +11,7 @@ class Box(Polytope):
     KIND = "box"
     PLANES = (((-1.0, 0.0, 0.0), 1.0), ((1.0, 0.0, 0.0), 1.0), ((0.0, -1.0, 0.0), 1.0), ((0.0, 1.0, 0.0), 1.0),
               ((0.0, 0.0, -1.0), 1.0), ((0.0, 0.0, 1.0), 1.0))
-    CORNERS = BOX_CORNERS
+    CORNERS, EDGES = BOX_CORNERS, BOX_EDGES
     __slots__ = ()
 
     def project(self, p, face):

@@ -3,6 +3,7 @@
 import copy
 import math
 
+from . import box_common
 from .solids import EPSILON, dot
 from .triangle import Triangle
 
@@ -76,3 +77,11 @@ class ClosedMesh:
     def support(self, axis):
         along = [dot(p, axis) for t in self.triangles for p in (t.a, t.b, t.c)]
         return min(along), max(along)
+
+    def clip(self, lo, hi):
+        """The box of the part inside a box, by the mesh's own box."""
+        return box_common(self.lo, self.hi, lo, hi)
+
+    def holds(self, lo, hi):
+        """Whether a box lies within, for certain: that is not found out."""
+        return False

@@ -2,7 +2,8 @@
 
 import math
 
-from .solids import UnitShape, clamp, divide, root
+from . import NOWHERE
+from .solids import EPSILON, UnitShape, clamp, divide, root
 
 #: Faces.
 SIDE, BASE, TOP = 0, 1, 2
@@ -132,3 +133,27 @@ class Cone(UnitShape):
         top = w[2] + self.ratio * across > across
         scale = (self.ratio if top else 1.0) / (across or 1.0)
         return w[0] * scale, w[1] * scale, 1.0 if top else 0.0
+
+    def shrink(self, lo, hi):
+        """The box leaves of the axis only heights whose discs reach into it: what is around these is the frustum between two."""
+        begin, end, radii, slacks = 0.0, 1.0, [], []
+        for row, c, l, h in zip(self.matrix, self.origin, lo, hi):
+            radius = math.sqrt(row[0] * row[0] + row[1] * row[1])
+            slack = 64 * EPSILON * (abs(c) + abs(row[2]) + radius + max(abs(l), abs(h)))
+            radii.append(radius)
+            slacks.append(slack)
+            # Discs reach from c + m z - r (1 - k z) to c + m z + r (1 - k z).
+            for room, slope in ((c + radius - l + slack, row[2] - self.k * radius), (h - c + radius + slack, -row[2] - self.k * radius)):
+                if slope > 0.0:
+                    begin = max(begin, divide(-room, slope) - 8 * EPSILON)
+                elif slope < 0.0:
+                    end = min(end, divide(-room, slope) + 8 * EPSILON)
+        if begin > end:
+            return NOWHERE
+        low, high = [], []
+        for row, c, l, h, radius, slack in zip(self.matrix, self.origin, lo, hi, radii, slacks):
+            first, second = c + row[2] * begin, c + row[2] * end
+            wide, narrow = radius * (1.0 - self.k * begin), radius * (1.0 - self.k * end)
+            low.append(max(l, min(first - wide, second - narrow) - slack))
+            high.append(min(h, max(first + wide, second + narrow) + slack))
+        return low, high

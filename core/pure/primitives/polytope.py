@@ -2,7 +2,8 @@
 
 import math
 
-from .solids import UnitShape, dot
+from . import NOWHERE
+from .solids import DOUBT, EPSILON, UnitShape, dot
 
 
 class Polytope(UnitShape):
@@ -13,9 +14,11 @@ class Polytope(UnitShape):
     PLANES : sequence of (normal, distance)
         Inside, normal . x <= distance; the face's number is the plane's.
     CORNERS : sequence of triples
+    EDGES : sequence of pairs
+        Numbers of corners.
     """
 
-    PLANES = CORNERS = ()
+    PLANES = CORNERS = EDGES = ()
     __slots__ = ()
 
     def crossings(self, o, d):
@@ -47,3 +50,42 @@ class Polytope(UnitShape):
 
     def furthest(self, w):
         return max(self.CORNERS, key=lambda corner: dot(w, corner))
+
+    def shrink(self, lo, hi):
+        """The part's corners are ends of what the box leaves of the solid's edges, and the solid of the box's edges."""
+        world = [[dot(row, p) + c for row, c in zip(self.matrix, self.origin)] for p in self.CORNERS]
+        slack = [64 * EPSILON * max(abs(lo[k]), abs(hi[k]), *(abs(p[k]) for p in world)) for k in range(3)]
+        points = []
+        for a, b in self.EDGES:
+            p, e, begin, end = world[a], [y - x for x, y in zip(world[a], world[b])], 0.0, 1.0
+            for k in range(3):
+                low, high = lo[k] - slack[k], hi[k] + slack[k]
+                if e[k] == 0.0:
+                    if p[k] < low or p[k] > high:
+                        begin = math.inf
+                    continue
+                one, other = (low - p[k]) / e[k], (high - p[k]) / e[k]
+                begin, end = max(begin, min(one, other)), min(end, max(one, other))
+            if begin <= end:
+                points += [[x + t * y for x, y in zip(p, e)] for t in (begin, end)]
+        middle = self.middle()
+        for a in range(3):
+            b, c = (a + 1) % 3, (a + 2) % 3
+            d = [(1.0 - DOUBT) * row[a] for row in self.inverse]
+            for k in range(4):
+                corner = [0.0] * 3
+                corner[a], corner[b], corner[c] = lo[a], (hi if k & 1 else lo)[b], (hi if k >> 1 else lo)[c]
+                q = [x - y for x, y in zip(corner, self.origin)]
+                q = [dot(row, q) for row in self.inverse]
+                # The edge a trifle nearer to the solid's middle: as if the solid were larger than rounding may make it.
+                begin, _, end, _ = self.crossings([x - DOUBT * (x - y) for x, y in zip(q, middle)], d)
+                if not begin <= end:
+                    continue
+                begin, end = max(0.0, begin), min(hi[a] - lo[a], end)
+                for t in (begin, end) if begin <= end else ():
+                    corner[a] = lo[a] + t
+                    points.append(list(corner))
+        if not points:
+            return NOWHERE
+        return ([max(l, min(p[k] for p in points) - slack[k]) for k, l in enumerate(lo)],
+                [min(h, max(p[k] for p in points) + slack[k]) for k, h in enumerate(hi)])

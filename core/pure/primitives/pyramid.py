@@ -1,6 +1,6 @@
 """The pyramid over a square, under any affine matrix."""
 
-from ...scene.solids import PYRAMID_CORNERS
+from ...scene.solids import PYRAMID_CORNERS, PYRAMID_EDGES
 from .polytope import Polytope
 from .solids import clamp
 
@@ -11,7 +11,7 @@ class Pyramid(Polytope):
     KIND = "pyramid"
     PLANES = (((-1.0, 0.0, 1.0), 1.0), ((1.0, 0.0, 1.0), 1.0), ((0.0, -1.0, 1.0), 1.0), ((0.0, 1.0, 1.0), 1.0),
               ((0.0, 0.0, -1.0), 0.0))
-    CORNERS = PYRAMID_CORNERS
+    CORNERS, EDGES = PYRAMID_CORNERS, PYRAMID_EDGES
     __slots__ = ()
 
     def project(self, p, face):

@@ -9,12 +9,16 @@ import math
 from importlib import import_module
 
 from ...scene.solids import place
-from . import Primitive, box_common, box_overlaps
+from . import NOWHERE, Primitive, box_common, box_overlaps
 from .affine import unit
 
 EPSILON = 2.0**-52
 #: Steps after which two shapes not yet proved to be apart count as touching.
 STEPS = 32
+#: Times that a box around a part of a shape is made smaller.
+ROUNDS = 2
+#: What rounding may do in unit space at most, where boxes are compared there; beyond 1/4 of it they are not.
+DOUBT = 2.0**-20
 
 #: Name of a kind -> (file in this folder, what makes the list of its solids from placed ones).
 MAKERS = {"sphere": ("sphere", "Sphere"), "box": ("box", "Box"), "cylinder": ("cylinder", "Cylinder"),
@@ -137,6 +141,10 @@ class UnitShape(Primitive):
         """Corners (lo, hi) of a large box within the unit shape; None where a line through it need not meet the surface."""
         raise NotImplementedError
 
+    def shrink(self, lo, hi):
+        """The box around the solid's part in a world box, its inside included; never too small."""
+        raise NotImplementedError
+
     # The same for all kinds.
 
     def to_unit(self, ray):
@@ -226,6 +234,39 @@ class UnitShape(Primitive):
         return [tuple(dot(row, p) + c for row, c in zip(self.matrix, self.origin)) for p in corners]
 
     def clip(self, lo, hi):
+        """The box of the part inside a box, the solid's inside included.
+
+        It is as tight as the kind's ``shrink`` tells: exact for polytopes; of round solids, wherever one side of the box
+        cuts at a time.
+        """
         if not self.overlaps(lo, hi):
-            return (math.inf,) * 3, (-math.inf,) * 3
-        return box_common(self.lo, self.hi, lo, hi)
+            return NOWHERE
+        lo, hi = box_common(self.lo, self.hi, lo, hi)
+        if self._certain(lo, hi):
+            for _ in range(ROUNDS):
+                lo, hi = self.shrink(lo, hi)
+                if any(l > h for l, h in zip(lo, hi)):
+                    return NOWHERE
+        return tuple(lo), tuple(hi)
+
+    def _certain(self, lo, hi):
+        """Whether a box, taken to unit space, is off by far less than its unit."""
+        size = [max(abs(l), abs(h)) + abs(c) for l, h, c in zip(lo, hi, self.origin)]
+        return max(dot([abs(w) for w in row], size) for row in self.inverse) * (16 * EPSILON) < 0.25 * DOUBT
+
+    def middle(self):
+        """The middle of the inscribed box, in unit space."""
+        return [(l + h) * 0.5 for l, h in zip(*self.inner())]
+
+    def holds(self, lo, hi):
+        """Whether the box lies within the closed solid, for certain."""
+        if self.inner() is None or not self._certain(lo, hi):
+            return False
+        middle = self.middle()
+        for k in range(8):
+            corner = [(h if k >> a & 1 else l) - c for a, (l, h, c) in enumerate(zip(lo, hi, self.origin))]
+            p = [dot(row, corner) for row in self.inverse]
+            # Seen from the middle, corners are put a little further out.
+            if not self.contains([x + DOUBT * (x - y) for x, y in zip(p, middle)]):
+                return False
+        return True

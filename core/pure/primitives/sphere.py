@@ -3,7 +3,7 @@
 import math
 
 from .affine import unit
-from .solids import UnitShape, clamp, divide, dot, root
+from .solids import DOUBT, EPSILON, UnitShape, clamp, divide, dot, root
 
 
 class Sphere(UnitShape):
@@ -53,3 +53,25 @@ class Sphere(UnitShape):
 
     def furthest(self, w):
         return unit(w)
+
+    def shrink(self, lo, hi):
+        """One coordinate between limits leaves of each other one what the ellipse at the nearer limit to its greatest place has."""
+        m, c = self.matrix, self.origin
+        lo, hi = list(lo), list(hi)
+        for a in range(3):
+            aa = dot(m[a], m[a])
+            reach = math.sqrt(aa)
+            for b in range(3):
+                if a == b:
+                    continue
+                ab, bb = dot(m[a], m[b]), dot(m[b], m[b])
+                slack = 64 * EPSILON * (abs(c[b]) + max(abs(lo[b]), abs(hi[b])))
+                low, high = lo[b] - c[b] - slack, hi[b] - c[b] + slack
+                slope, top = ab / bb, ab / reach
+                rest = math.sqrt(max(aa - slope * ab, 0.0))
+                slack = DOUBT * reach + 8 * EPSILON * abs(c[a])
+                y = clamp(top, low, high)
+                hi[a] = min(hi[a], c[a] + (slope * y + (rest * math.sqrt(max(1.0 - y * y / bb, 0.0)) + slack)))
+                y = clamp(-top, low, high)
+                lo[a] = max(lo[a], c[a] + (slope * y - (rest * math.sqrt(max(1.0 - y * y / bb, 0.0)) + slack)))
+        return lo, hi
