@@ -1,0 +1,328 @@
+"""Casting beams: which faces they see where, from front to back.
+
+A beam's cross-section in the picture is in pieces that are convex polygons. Each goes down the BSP tree from front to
+back; at a face it is cut by the face's outline: what is inside is a fragment of the picture, what is outside goes on.
+All clipping is that of convex polygons by lines in the picture, whose areas are conserved. All pieces of all beams
+advance together. Nodes and faces that wait are lists linked one into the other, so that the parts of a piece share
+what is left of its walk.
+"""
+
+import numpy as np
+
+from .beam_clip import boxes, cut, joined, sides, widened
+
+#: Lines nearer than this to a corner, in pixels, pass through it.
+TOLERANCE = 1e-10
+#: A face seen at less than this angle, about, has no extent in the picture.
+EDGE_ON = 1e-12
+#: What is seen where there is no face.
+SKY = -1
+
+
+class Fragments:
+    """What beams see.
+
+    Attributes
+    ----------
+    beam : ndarray, shape (n,)
+    surface : ndarray, shape (n,)
+        SKY where there is nothing; numbers of boxes, or one more, where it is not known.
+    source : ndarray, shape (n,)
+        The fragment of the surface that sent the beam on, -1 for none.
+    points, count
+        Convex polygons in the picture, counter-clockwise.
+    """
+
+    def __init__(self, beam, surface, source, points, count):
+        self.beam, self.surface, self.source, self.points, self.count = beam, surface, source, points, count
+
+    def __len__(self):
+        return len(self.beam)
+
+    def take(self, which):
+        """Some of them."""
+        return Fragments(*(getattr(self, n)[which] for n in ("beam", "surface", "source", "points", "count")))
+
+    @classmethod
+    def none(cls):
+        """No fragments."""
+        return cls(*(np.zeros(0, np.int64) for _ in range(3)), np.zeros((0, 3, 2)), np.zeros(0, np.int64))
+
+    @classmethod
+    def joined(cls, parts):
+        """Several as one."""
+        points, count = joined([(p.points, p.count) for p in parts])
+        return cls(*(np.concatenate([getattr(p, n) for p in parts]) for n in ("beam", "surface", "source")), points, count)
+
+
+class Walk:
+    """Pieces on their way through the BSP tree.
+
+    Parameters
+    ----------
+    bsp : Bsp
+    beams : Beams
+    unknown : int
+        Number that stands for the surface where it is not known.
+    most : int
+        Pieces and fragments, at most; what is left then is not known.
+    check : callable
+
+    Attributes
+    ----------
+    tests, steps : ndarray
+        For each beam: pieces tested against faces; nodes entered.
+    full : bool
+        Whether there were too many.
+    """
+
+    def __init__(self, bsp, beams, unknown, most, check):
+        self.bsp, self.beams, self.unknown, self.most, self.check = bsp, beams, unknown, most, check
+        self.tests, self.steps, self.full = np.zeros(len(beams), np.int64), np.zeros(len(beams), np.int64), False
+        self.task, self.next, self.end = np.zeros(1024, np.int64), np.zeros(1024, np.int64), 0
+
+    def cast(self, beam, source, points, count):
+        """Walk to the end.
+
+        Parameters
+        ----------
+        beam, source : ndarray, shape (n,)
+        points, count
+            Cross-sections.
+
+        Returns
+        -------
+        Fragments
+        """
+        self.out, self.made = [], 0
+        self.beam, self.source, self.points, self.count = beam, source, points, count
+        self.top, self.sight = np.full(len(beam), -1), self._sight(beam, points)
+        if len(self.bsp):
+            root = np.flatnonzero(self._inside(np.arange(len(beam)), np.zeros(len(beam), np.int64)))
+            self._push(root, np.zeros(len(root), np.int64))
+        while True:
+            self.check()
+            self._done(self.top < 0, SKY)
+            if not len(self.beam):
+                break
+            if self.made + len(self.beam) > self.most:
+                self.full = True
+                self._done(np.ones(len(self.beam), bool), self.unknown)
+                break
+            task = self.task[self.top]
+            self.top = self.next[self.top]
+            node, face = np.flatnonzero(task < len(self.bsp)), np.flatnonzero(task >= len(self.bsp))
+            if len(node):
+                self._enter(node, task[node])
+            if len(face):
+                self._meet(face, task[face] - len(self.bsp))
+        return Fragments.joined(self.out) if self.out else Fragments.none()
+
+    def _done(self, which, surface):
+        """Pieces, given by a mask, that see one and the same."""
+        some = np.flatnonzero(which)
+        if len(some):
+            self._keep(some, np.full(len(some), surface), self.points[some], self.count[some])
+            self._only(~which)
+
+    def _keep(self, which, surface, points, count):
+        """Fragments of pieces."""
+        if len(which):
+            points = points[:, : int(count.max())]
+            self.out.append(Fragments(self.beam[which], surface, self.source[which], points, count))
+            self.made += len(which)
+
+    def _only(self, which):
+        """Go on with some of the pieces."""
+        for name in ("beam", "source", "points", "count", "top", "sight"):
+            setattr(self, name, getattr(self, name)[which])
+
+    def _push(self, which, task):
+        """Put tasks in front of what pieces still have to do."""
+        end = self.end + len(which)
+        if end > len(self.task):
+            room = np.zeros(max(end, len(self.task)), np.int64)
+            self.task, self.next = np.concatenate([self.task, room]), np.concatenate([self.next, room])
+        self.task[self.end:end], self.next[self.end:end] = task, self.top[which]
+        self.top[which] = np.arange(self.end, end)
+        self.end = end
+
+    def _sight(self, beam, points):
+        """Half-spaces around pieces: four through the beam's origin, and where it starts; shape (n, 5, 4)."""
+        lo, hi = boxes(points)
+        x, y, _, w = self.beams.map[beam].transpose(1, 0, 2)
+        planes = x - lo[:, :1] * w, hi[:, :1] * w - x, y - lo[:, 1:] * w, hi[:, 1:] * w - y, self.beams.start[beam]
+        return np.stack(planes, axis=1)
+
+    def _inside(self, piece, node):
+        """Whether the boxes of nodes reach into the half-spaces around pieces."""
+        lo, hi = self.bsp.lo[node], self.bsp.hi[node]
+        plane = self.sight[piece]
+        centre, half = 0.5 * (lo + hi), 0.5 * (hi - lo) + self.bsp.tolerance
+        normal = plane[..., :3]
+        height = np.matmul(normal, centre[..., None])[..., 0] + plane[..., 3]
+        reach = np.matmul(np.abs(normal), half[..., None])[..., 0]
+        # Rounding, of numbers as large as the map's.
+        slack = 2.0**-46 * (np.abs(plane[..., 3]) + reach)
+        return (height >= -reach - slack).all(axis=1)
+
+    def _enter(self, piece, node):
+        """Nodes: what is beyond the plane is put by, then the faces in it, then what is before it."""
+        bsp, beam = self.bsp, self.beam[piece]
+        self.steps += np.bincount(beam, minlength=len(self.beams))
+        front = (bsp.plane[node] * self.beams.back[beam, :, 2]).sum(axis=1) >= 0.0
+        self._push_node(piece, np.where(front, bsp.below[node], bsp.above[node]))
+        some = np.flatnonzero(bsp.first[node] >= 0)
+        self._push(piece[some], len(bsp) + bsp.first[node[some]])
+        self._push_node(piece, np.where(front, bsp.above[node], bsp.below[node]))
+
+    def _push_node(self, piece, node):
+        """Put nodes in front that pieces can meet; -1 is none."""
+        some = np.flatnonzero(node >= 0)
+        some = some[self._inside(piece[some], node[some])]
+        self._push(piece[some], node[some])
+
+    def _meet(self, piece, face):
+        """Faces: pieces are cut by their outlines."""
+        bsp, beam = self.bsp, self.beam[piece]
+        more = np.flatnonzero(bsp.more[face])
+        self._push(piece[more], len(bsp) + face[more] + 1)
+        self.tests += np.bincount(beam, minlength=len(self.beams))
+        line, seen, h = outlines(
+            self.beams, beam, bsp.points[face], bsp.count[face], bsp.face_plane[face], bsp.turn[face], bsp.tolerance
+        )
+        d = distances(line, self.points[piece])
+        seen &= ~(d.max(axis=2) <= TOLERANCE).any(axis=1) & ~_apart(self.points[piece], h)
+        at = np.flatnonzero(seen)
+        if not len(at):
+            return
+        piece, line, surface = piece[at], line[at], bsp.surface[face[at]]
+        whole = (d[at] >= -TOLERANCE).all(axis=(1, 2))
+        stay = np.ones(len(self.beam), bool)
+        inside = np.flatnonzero(whole)
+        own = piece[inside]
+        self._keep(own, surface[inside], self.points[own], self.count[own])
+        stay[own] = False
+        piece, line, surface = piece[~whole], line[~whole], surface[~whole]
+        points, count, rest, owner = carved(self.points[piece], self.count[piece], line)
+        some = np.flatnonzero(count > 0)
+        self._keep(piece[some], surface[some], points[some], count[some])
+        stay[piece[some]] = False
+        # A piece that nothing was cut from stays as it is.
+        parts = np.flatnonzero(count[owner] > 0)
+        source = np.concatenate([np.flatnonzero(stay), piece[owner[parts]]])
+        if len(parts):
+            self.points, self.count = joined(
+                [(self.points[stay], self.count[stay]), (rest[0][parts], rest[1][parts])]
+            )
+            sight = self._sight(self.beam[piece[owner[parts]]], rest[0][parts])
+            self.sight = np.concatenate([self.sight[stay], sight])
+        else:
+            self.points, self.count, self.sight = self.points[stay], self.count[stay], self.sight[stay]
+        for name in ("beam", "source", "top"):
+            setattr(self, name, getattr(self, name)[source])
+
+
+def distances(line, points):
+    """Of corners, shape (n, v, 2), from lines, shape (n, l, 3): shape (n, l, v)."""
+    return np.matmul(line[..., :2], points.transpose(0, 2, 1)) + line[..., 2:]
+
+
+def outlines(beams, beam, points, count, plane, turn, tolerance):
+    """Lines around faces in the picture of their beams.
+
+    Parameters
+    ----------
+    beams : Beams
+    beam : ndarray, shape (m,)
+    points : ndarray, shape (m, v, 3)
+        In the world.
+    count : ndarray, shape (m,)
+    plane : ndarray, shape (m, 4)
+    turn : ndarray, shape (m,)
+        1 where the corners are counter-clockwise seen from above the plane, else -1.
+    tolerance : float
+        Heights that are none.
+
+    Returns
+    -------
+    line : ndarray, shape (m, v + 2, 3)
+        Inside positive, distances in pixels; the last two keep within the beam's half-spaces.
+    seen : ndarray, shape (m,), bool
+        False for faces seen edge-on, or outside of the half-spaces.
+    h : ndarray, shape (m, v, 3)
+        Corners in the picture: x w, y w, w.
+    """
+    m, v, _ = points.shape
+    form = beams.map[beam][:, [0, 1, 3]]
+    h = np.matmul(points, form[:, :, :3].transpose(0, 2, 1)) + form[:, None, :, 3]
+    sight = beams.sight(beam, plane)
+    line = np.zeros((m, v + 2, 3))
+    line[:, :v] = np.cross(h, np.roll(h, -1, axis=1)) * (np.sign(sight) * beams.hand[beam] * turn)[:, None, None]
+    line[:, :v][np.arange(v) >= count[:, None]] = 0.0
+    seen = np.abs(sight) > EDGE_ON
+    for k, limit in enumerate((beams.start[beam], beams.end[beam])):
+        height = np.matmul(points, limit[:, :3, None])[..., 0] + limit[:, 3:]
+        seen &= height.max(axis=1) > tolerance
+        some = np.flatnonzero(seen & (height.min(axis=1) < -tolerance))
+        if len(some):
+            own = np.einsum("mk,mkl->ml", limit[some], beams.back[beam[some]])
+            near = beams.nearness(beam[some], plane[some])
+            line[some, v + k] = own[:, [0, 1, 3]] + own[:, 2:3] * near
+    size = np.hypot(line[..., 0], line[..., 1])
+    size = np.maximum(size, 1e-12 * np.abs(line[..., 2]))
+    none = size == 0.0
+    line /= np.where(none, 1.0, size)[..., None]
+    line[none] = (0.0, 0.0, 1.0)
+    return line, seen, h
+
+
+def _apart(points, h):
+    """Whether an edge of a piece has all of a face beyond it."""
+    following = np.roll(points, -1, axis=1)
+    step = following - points
+    size = np.hypot(step[..., 0], step[..., 1])
+    safe = np.where(size > 0.0, size, 1.0)
+    a, b = -step[..., 1] / safe, step[..., 0] / safe
+    c = -(a * points[..., 0] + b * points[..., 1])
+    x, y, w = (h[:, None, :, k] for k in range(3))
+    value = a[..., None] * x + b[..., None] * y + c[..., None] * w
+    return ((value <= TOLERANCE * np.abs(w)).all(axis=2) & (size > 0.0)).any(axis=1)
+
+
+def carved(points, count, line):
+    """Cut what is inside of all lines out of convex polygons.
+
+    Parameters
+    ----------
+    points, count
+        n polygons.
+    line : ndarray, shape (n, l, 3)
+
+    Returns
+    -------
+    points, count
+        What is inside; the count is 0 where there is nothing.
+    (points, count), owner
+        What is outside, in convex parts, and of which polygon each is.
+    """
+    left, owner = [(np.zeros((0, 3, 2)), np.zeros(0, np.int64))], [np.zeros(0, np.int64)]
+    count = count.copy()
+    for k in range(line.shape[1]):
+        d = distances(line[:, k : k + 1], points)[:, 0]
+        side = sides(d, TOLERANCE)
+        above, below = (side > 0).any(axis=1), (side < 0).any(axis=1)
+        out = np.flatnonzero(~above & below & (count > 0))
+        if len(out):
+            left.append((points[out], count[out]))
+            owner.append(out)
+            count[out] = 0
+        both = np.flatnonzero(above & below & (count > 0))
+        if len(both):
+            inside, outside = cut(points[both], count[both], d[both], side[both])
+            left.append(outside)
+            owner.append(both)
+            points = widened(points, inside[0].shape[1]).copy()
+            points[both] = widened(inside[0], points.shape[1])
+            count[both] = inside[1]
+    return points, count, joined(left), np.concatenate(owner)
