@@ -207,6 +207,9 @@ TECHNIQUES = (
               "Haines and Greenberg 1986",
               "Around each light, lists of what is seen in each direction; other rays are handed to a bvh", rays=("shadow",),
               parameters=(
+                  Parameter("faces", {"pure": "adaptive", "fast": "uniform"}, "How the direction cube's faces are divided: evenly, or as a quadtree",
+                            choices=("uniform", "adaptive")),
+                  Parameter("z_buffer", False, "With uniform faces: full occluders are found with a z-buffer, and lists end behind them"),
                   Parameter("resolution", 0, "Cells along an edge of the direction cube; 0 means by the number of primitives", low=0, high=4096),
                   Parameter("max_bytes", 256e6, "Above it the buffers of lights not used for longest are given up", low=1e3, high=1e12, unit="bytes"),
               )),

@@ -181,8 +181,13 @@ LIGHTS = {
 }
 
 
+#: Ways to divide the faces, besides the default.
+FACES = {"pure": ({"faces": "uniform", "resolution": 6}, {"faces": "uniform", "resolution": 6, "z_buffer": True}),
+         "fast": ({"faces": "adaptive"}, {"z_buffer": True}, {"z_buffer": True, "resolution": 7})}
+
+
 @functools.cache
-def lit(name, kind, core):
+def lit(name, kind, core, **more):
     """A data set with a light, a light buffer over it, brute force, and rays to the light."""
     scene = scene_of(name)[0]
     rng = np.random.default_rng([5, *name.encode(), *kind.encode()])
@@ -203,7 +208,7 @@ def lit(name, kind, core):
         if BY_NAME[name].instanced:
             from rayscope.core.scene.layout import Layout
             patch.setattr(Layout, "of", functools.partial(Layout.of, copies_at_most=0))
-        return light, build(scene, "light-buffer", core), build(scene, "brute", core), o, d
+        return light, build(scene, "light-buffer", core, **more), build(scene, "brute", core), o, d
 
 
 #: Through edges and corners of the direction cube, and along its axes.
@@ -211,9 +216,19 @@ DIAGONALS = np.array([(x, y, z) for x in (-1, 0, 1) for y in (-1, 0, 1) for z in
 
 
 @pytest.mark.parametrize("core", CORES)
+@pytest.mark.parametrize("name, kind", in_turn(LIGHTS, 1)[::3])
+def test_shadow_rays_however_faces_are_divided(name, kind, core):
+    for more in FACES[core]:
+        shadow_rays_are_right(*lit(name, kind, core, **more))
+
+
+@pytest.mark.parametrize("core", CORES)
 @pytest.mark.parametrize("name, kind", in_turn(LIGHTS, 2))
 def test_shadow_rays(name, kind, core):
-    light, index, brute, o, d = lit(name, kind, core)
+    shadow_rays_are_right(*lit(name, kind, core))
+
+
+def shadow_rays_are_right(light, index, brute, o, d):
     far = math.inf if light.kind == "sun" else 1.0 - 1e-12
     towards = index.for_light(light)
     for t_min, t_max in ((0.0, far), (0.0, 0.4), (0.5, far)):
@@ -263,3 +278,91 @@ def test_pictures_with_directional_techniques_are_those_of_the_bvh(core):
         for name in ("object_index", "primitive_index", "depth"):
             assert np.array_equal(plain.passes[name], ours.passes[name])
         assert ours.figures["shadow"]["technique"] == "light-buffer" and ours.figures["shadow"]["rays"] == plain.figures["shadow"]["rays"]
+
+
+OCCLUDERS = {
+    "triangle": solids.polygon([(-9.0, -7.0, 0.0), (9.0, -7.0, 0.5), (0.0, 9.0, -0.5)]),
+    "box": solids.box((-2.0, -2.0, -0.4), (2.0, 2.5, 0.3)),
+    "sphere": solids.sphere((0.2, 0.1, 0.0), 2.5),
+    "polygon": solids.polygon([(x, y, 0.125 * x - 0.0625 * y) for x, y in ((-3.0, -3.0), (3.0, -3.0), (3.5, 2.0), (0.0, 4.0), (-3.0, 3.0))]),
+    "cone": solids.cone((0.0, 0.0, -1.0), (0.0, 0.0, 1.0), 3.0, 1.5),
+}
+
+
+def behind(kind):
+    """An occluder, and many small triangles behind it, seen from a light and a camera above; rays from there to the light."""
+    rng = np.random.default_rng(0)
+    corners = (rng.uniform(-4, 4, (200, 1, 3)) * (1, 1, 0.4) - (0.0, 0.0, 4.0) + 0.3 * rng.normal(size=(200, 3, 3))).reshape(-1, 3)
+    occluder = OCCLUDERS[kind]
+    scene = Scene.from_triangles(corners, np.arange(600).reshape(-1, 3))
+    scene.objects.append(Object("occluder", Shapes([occluder])))
+    scene.camera = Camera.look_at((0.1, 0.2, 4.0), (0.0, 0.0, 0.0), up=(0.0, 1.0, 0.0))
+    scene.lights = [Light("lamp", "point", (1.0,) * 3, position=(0.1, 0.2, 4.0)), Light("sun", "sun", (1.0,) * 3, direction=(0.1, 0.05, -1.0))]
+    return scene, np.concatenate([rng.uniform(-4, 4, (100, 3)) - (0, 0, 2.0), corners[:40]])
+
+
+@pytest.mark.parametrize("core, more", [(core, more) for core in CORES for more in ({"faces": "adaptive"}, {"faces": "uniform", "z_buffer": True, "resolution": 12})],
+                         ids=lambda x: "-".join(map(str, x.values())) if isinstance(x, dict) else x)
+@pytest.mark.parametrize("kind", OCCLUDERS)
+def test_full_occluders_end_lists(kind, core, more):
+    scene, o = behind(kind)
+    index, brute = build(scene, "light-buffer", core, **more), build(scene, "brute", core)
+    for light in scene.lights:
+        d = np.array(light.position) - o if light.kind == "point" else np.broadcast_to(-np.array(light.direction), o.shape)
+        far = 1.0 - 1e-12 if light.kind == "point" else math.inf
+        assert np.array_equal(index.for_light(light).occluded(o, d, 0.0, far), brute.occluded(o, d, 0.0, far))
+        for limits in ((0.0, 0.3), (0.3, 0.6)):
+            assert np.array_equal(index.for_light(light).occluded(o, d, *limits), brute.occluded(o, d, *limits))
+        same(index.for_light(light).closest(o, d, 0.0, far), brute.closest(o, d, 0.0, far))
+    buffers = index.buffers.values()
+    if core == "fast":
+        lists = [face for b in buffers for face in (b.cube.faces.values() if hasattr(b, "cube") else [b.lists])]
+        covered = [(face, cell) for face in lists for cell in np.flatnonzero(face.covered >= 0)]
+        assert 200 in {int(face.feet.item[face.covered[cell]]) for face, cell in covered}
+        # What ends a list is in it.
+        assert all(face.covered[cell] in face.entry[face.start[cell]:face.start[cell + 1]] for face, cell in covered if hasattr(face.grid, "du"))
+        lengths = [face.start[cell + 1] - face.start[cell] for face, cell in covered if face.feet.item[face.covered[cell]] == 200]
+    else:
+        cells = [cell for b in buffers for _, root in b.faces.values() for cell in root.walk() if not cell.children and cell.covered >= 0]
+        assert all(cell.covered in {item for _, item in cell.entries} for cell in cells)
+        lengths = [len(cell.entries) for cell in cells if cell.covered == 200]
+    assert len(lengths) > 6 and np.mean(lengths) < 2.0
+
+
+@pytest.mark.parametrize("kind", OCCLUDERS)
+@pytest.mark.parametrize("perspective", [True, False])
+def test_cells_said_to_be_covered_are(kind, perspective):
+    """Rays through such cells meet the occluder, no farther than said; both cores say nearly the same."""
+    from rayscope.core.fast.directional.covers import Covers
+    from rayscope.core.fast.directional.view import Footprints, View
+    from rayscope.core.pure.directional.view import View as PureView
+    scene = Scene([Object("occluder", Shapes([OCCLUDERS[kind]]))])
+    rng = np.random.default_rng(1)
+    found = 0
+    for _ in range(12):
+        eye = np.array([0.0, 0.0, 6.0]) + rng.uniform(-2, 2, 3)
+        forward = (rng.uniform(-1, 1, 3) - eye) / 6.0
+        axes = eye, np.cross(forward, (0, 1, 0)), (0.0, 1.0, 0.1), forward
+        window = (-0.9, 1.0, -0.8, 1.0) if perspective else (-4.0, 4.0, -3.5, 4.0)
+        view = View(*axes, window, perspective, 20.0)
+        index = build(scene, "brute")
+        feet = Footprints.of(view, index.primitives)
+        covers = Covers.of(view, index.primitives, feet.item)
+        half = 0.5 ** rng.integers(1, 6, 200)
+        u, v = rng.uniform(-1, 1, (2, 200))
+        low = covers.least(np.zeros(200, int), u, v, half, half)
+        pure = PureView(*(tuple(map(float, a)) for a in axes), window, perspective, 20.0)
+        foot = pure.footprint(0, build(scene, "brute", "pure").primitives[0])
+        said = [foot.covers((a - h, a + h, b - h, b + h)) for a, b, h in zip(u, v, half)]
+        assert np.mean(np.array(said) == (low > -np.inf)) > 0.99
+        for k in np.flatnonzero(low > -np.inf):
+            found += 1
+            a, b = (c[k] + half[k] * np.concatenate([rng.uniform(-1, 1, 20), s]) for c, s in ((u, [-1, -1, 1, 1]), (v, [-1, 1, -1, 1])))
+            inverse = np.linalg.inv(view.rows)
+            if perspective:
+                o, d = np.broadcast_to(eye, (24, 3)), (inverse @ np.stack([a, b, np.ones(24)])).T
+            else:
+                o, d = eye + (inverse @ np.stack([a + view.shift[0], b + view.shift[1], np.zeros(24)])).T, np.broadcast_to(inverse[:, 2], (24, 3))
+            t = index.closest(o, d).t
+            assert np.isfinite(t).all() and (1.0 / t if perspective else -t).min() >= low[k]
+    assert found > 30

@@ -19,11 +19,13 @@ class Cube:
         Cells along an edge of the cube; 0 for as many as primitives ask for.
     most_bytes : float
         For one face.
+    **division
+        `adaptive` and `z_buffer`, as of :class:`Lists`.
     """
 
-    def __init__(self, position, primitives, extra, resolution=0, most_bytes=np.inf):
+    def __init__(self, position, primitives, extra, resolution=0, most_bytes=np.inf, **division):
         self.position, self.primitives = np.asarray(position, float), primitives
-        self.resolution, self.most_bytes = resolution, most_bytes
+        self.resolution, self.most_bytes, self.division = resolution, most_bytes, division
         self.views = []
         for axis in range(3):
             for sign in (1.0, -1.0):
@@ -39,7 +41,7 @@ class Cube:
         """The lists of one face: 0 to 5 are +x, -x, +y, -y, +z, -z."""
         if number not in self.faces:
             which = np.flatnonzero(self._may_show(number))
-            self.faces[number] = Lists(self.views[number], self.primitives, self.resolution, self.most_bytes, which)
+            self.faces[number] = Lists(self.views[number], self.primitives, self.resolution, self.most_bytes, which, occludes=ends, **self.division)
         return self.faces[number]
 
     def _may_show(self, number):
@@ -64,3 +66,8 @@ class Cube:
         depth = np.abs(along)
         with np.errstate(all="ignore"):
             return 2 * axis + (along < 0.0), right / depth, up / depth, depth
+
+
+def ends(low, nearest):
+    """A primitive that covers a cell in front of the light, and does not reach to the light itself, is a full occluder."""
+    return (low > 0.0) & (nearest < np.inf)

@@ -1,8 +1,8 @@
 """The light buffer (Haines and Greenberg 1986): a direction cube in every light, for the shadow rays that go there.
 
 A shadow ray need only be tested against what is listed in the cell through which the light sees its origin, as far as
-that origin. The sun has one parallel grid. Rays that go to no light, to a light with an extent, or beyond their light
-are handed over.
+that origin; lists may end at a primitive that covers the whole cell, the full occluder. The sun has one parallel window.
+Rays that go to no light, to a light with an extent, or beyond their light are handed over.
 """
 
 import numpy as np
@@ -10,7 +10,7 @@ import numpy as np
 from ...errors import Notice
 from ..structure import Structure
 from .cube import Cube
-from .lists import LOSS, Lists
+from .lists import LOSS, Lists, centre_buffer
 from .second import Handing
 from .view import View
 
@@ -27,10 +27,15 @@ class LightBuffer(Handing):
     ----------
     buffers : dict
         Light's number -> buffer, the most recently used last.
+    z_buffer : callable
+        What proposes full occluders of uniform faces, as of :class:`Lists`; may be replaced before the first ray comes.
     """
 
-    def build(self, progress, resolution, max_bytes):
+    z_buffer = staticmethod(centre_buffer)
+
+    def build(self, progress, resolution, max_bytes, faces, z_buffer):
         self.resolution, self.max_bytes = resolution, max_bytes
+        self.adaptive, self.cuts = faces == "adaptive", z_buffer
         self.buffers = {}
         p = self.primitives
         with np.errstate(all="ignore"):
@@ -65,7 +70,8 @@ class LightBuffer(Handing):
         if buffer is None:
             light = self.lights[number]
             kind = _Sun if light.kind == "sun" else _Point
-            buffer = kind(light, self.primitives, self.extra, self.resolution, self.max_bytes)
+            buffer = kind(light, self.primitives, self.extra, self.resolution, self.max_bytes,
+                          adaptive=self.adaptive, z_buffer=self.z_buffer if self.cuts else None)
         self.buffers[number] = buffer
         return buffer
 
@@ -109,9 +115,9 @@ class OneLight(Structure):
 class _Point:
     """The direction cube of a point or spot light."""
 
-    def __init__(self, light, primitives, extra, resolution, most_bytes):
+    def __init__(self, light, primitives, extra, resolution, most_bytes, **division):
         self.extra = max(extra, float(np.abs(light.position).max()))
-        self.cube = Cube(light.position, primitives, self.extra, resolution, most_bytes / 6.0)
+        self.cube = Cube(light.position, primitives, self.extra, resolution, most_bytes / 6.0, **division)
 
     @property
     def nbytes(self):
@@ -126,7 +132,7 @@ class _Point:
         return sum(len(face.entry) for face in self.cube.faces.values())
 
     def test(self, rays, query, which):
-        """Test those of the rays `which` that go to the light; a mask of them."""
+        """Test those of the rays `which` that go to the light, as far as lists tell; a mask of them."""
         o, d, t_min, t_max = (rays.o, rays.d, rays.t_min, rays.t_max) if len(which) == rays.n else _some(rays, which)
         with np.errstate(all="ignore"):
             w = o - self.cube.position[:, None]
@@ -140,23 +146,23 @@ class _Point:
             return own
         if not own.all():
             some = np.flatnonzero(own)
-            w, ray, start = w[:, some], which[some], t_min[some] / reach[some]
+            w, ray, start, stop = w[:, some], which[some], t_min[some] / reach[some], t_max[some] / reach[some]
         else:
-            ray, start = which, t_min / reach
+            some, ray, start, stop = np.arange(len(which)), which, t_min / reach, t_max / reach
         number, u, v, z = Cube.through(w)
         # From the light, what lies farther than the ray's beginning does not matter.
         with np.errstate(divide="ignore"):
-            nearness = (1.0 - 4.0 * LOSS) / (z * (1.0 - start))
+            nearness, end = (1.0 - 4.0 * LOSS) / (z * (1.0 - start)), (1.0 - 4.0 * LOSS) / (z * (1.0 - stop))
         for k in np.flatnonzero(np.bincount(number, minlength=6)):
             at = np.flatnonzero(number == k)
-            self.cube.face(int(k)).test(query, ray[at], u[at], v[at], nearness[at])
+            own[some[at[self.cube.face(int(k)).test(query, ray[at], u[at], v[at], nearness[at], end[at])]]] = False
         return own
 
 
 class _Sun:
-    """The parallel grid of the sun."""
+    """The parallel window of the sun."""
 
-    def __init__(self, light, primitives, extra, resolution, most_bytes):
+    def __init__(self, light, primitives, extra, resolution, most_bytes, **division):
         forward = np.array(light.direction, float)
         forward /= np.linalg.norm(forward)
         right = np.cross(forward, np.eye(3)[np.abs(forward).argmin()])
@@ -167,7 +173,7 @@ class _Sun:
         # The scene lies behind the plane where z = 0, and within the window.
         view = View(centre - 2.0 * radius * forward, right, np.cross(forward, right), forward, (-radius, radius) * 2, False, extra)
         self.view, self.extra = view, view.extra
-        self.lists, self._make = None, lambda: Lists(view, primitives, resolution, most_bytes)
+        self.lists, self._make = None, lambda: Lists(view, primitives, resolution, most_bytes, **division)
 
     @property
     def nbytes(self):
@@ -182,10 +188,10 @@ class _Sun:
         return len(self.lists.entry) if self.lists else 0
 
     def test(self, rays, query, which):
-        """Test those of the rays `which` that go to the sun; a mask of them."""
+        """Test those of the rays `which` that go to the sun, as far as lists tell; a mask of them."""
         if not self.view.usable:
             return np.zeros(len(which), bool)
-        o, d, t_min, _ = (rays.o, rays.d, rays.t_min, rays.t_max) if len(which) == rays.n else _some(rays, which)
+        o, d, t_min, t_max = (rays.o, rays.d, rays.t_min, rays.t_max) if len(which) == rays.n else _some(rays, which)
         view = self.view
         forward = view.rows[2]
         along = forward[0] * d[0] + forward[1] * d[1] + forward[2] * d[2]
@@ -199,7 +205,10 @@ class _Sun:
             self.lists = self.lists or self._make()
             start = z[seen] + t_min[seen] * along[seen]
             nearness = -start - 4.0 * LOSS * (np.abs(start) + np.abs(z[seen]))
-            self.lists.test(query, which[seen], u[seen], v[seen], nearness)
+            with np.errstate(invalid="ignore"):
+                stop = z[seen] + t_max[seen] * along[seen]
+                end = np.where(stop > -np.inf, -stop - 4.0 * LOSS * (np.abs(stop) + np.abs(z[seen])), np.inf)
+            own[seen[self.lists.test(query, which[seen], u[seen], v[seen], nearness, end)]] = False
         return own
 
 

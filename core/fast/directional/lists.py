@@ -1,14 +1,23 @@
 """Lists of primitives per cell of a window: what lies in that solid angle, ascending by its nearest distance.
 
 Lists are conservative: a primitive is in the list of every cell that its footprint reaches into, and no cell is judged by
-its centre.
+its centre. A list may end behind a full occluder, a primitive that is proved to cover the whole cell: in adaptive windows any
+is found, in uniform ones a z-buffer of the cells' centres proposes one a cell.
 """
+
+import math
 
 import numpy as np
 
+from ..query import Occluded
+from .covers import Covers
 from .image_directory import inside
+from .quadtree import Quadtree, cut, nearness as nearness_in
 from .raster import Grid, spans
 from .view import Footprints
+
+#: Levels of an adaptive window, where no resolution is asked for.
+LEVELS = 8
 
 #: Cells a footprint, where no resolution is asked for.
 CELLS_PER_PRIMITIVE = 1.0
@@ -29,21 +38,58 @@ class Lists:
     ----------
     feet : Footprints
         Nearest first.
-    grid : Grid or None
+    grid : Grid, Quadtree, or None
         Over the part of the window where there is anything.
     start : ndarray, shape (cells + 1,)
         Where each cell's entries begin.
     entry : ndarray, int32
         Numbers of footprints, ascending in each cell.
+    covered : ndarray
+        Footprint of each cell's full occluder, behind which nothing is listed; -1 for none.
     nbytes : int
+
+    Parameters
+    ----------
+    view : View
+    primitives : Primitives
+    resolution : int
+        Cells along an edge of the window, the smallest ones of an adaptive window; 0 for as many as primitives ask for.
+    most_bytes : float
+    which : ndarray, optional
+        Numbers of the primitives that may be seen.
+    adaptive : bool
+        A quadtree.
+    z_buffer : callable, optional
+        For a uniform window: ``z_buffer(view, grid, primitives, feet)`` proposes for each cell the number of a primitive that may
+        cover it, -1 for none.
+    occludes : callable, optional
+        As of :class:`Quadtree`.
     """
 
-    def __init__(self, view, primitives, resolution=0, most_bytes=np.inf, which=None):
+    def __init__(self, view, primitives, resolution=0, most_bytes=np.inf, which=None, adaptive=False, z_buffer=None, occludes=None):
         self.view = view
         self.feet = feet = Footprints.of(view, primitives, which=which)
         self.grid, self.entry, self.nbytes = None, np.zeros(0, np.int32), 0
+        self.start, self.covered = np.zeros(1, np.int64), np.zeros(0, np.int64)
+        self.cuts = adaptive or z_buffer is not None
         if not len(feet):
             return
+        occludes = occludes or always
+        if adaptive:
+            levels = math.ceil(math.log2(resolution)) if resolution else LEVELS
+            # An entry costs four bytes, and a leaf has a few of them.
+            tree = self.grid = Quadtree(view, primitives, feet, levels, occludes, (most_bytes - feet.nbytes) / 32)
+            self.start, self.entry, self.covered = tree.start, tree.entry, tree.covered
+            self.nbytes = feet.nbytes + tree.nbytes
+            return
+        self._make_uniform(resolution, most_bytes)
+        self.covered = np.full(len(self.start) - 1, -1)
+        if z_buffer:
+            self._cut(primitives, z_buffer(view, self.grid, primitives, feet), occludes)
+
+    def _make_uniform(self, resolution, most_bytes):
+        """Divide evenly, more coarsely if that takes too much memory."""
+        feet = self.feet
         u_lo, v_lo = max(-1.0, float(feet.u_lo.min())), max(-1.0, float(feet.v_lo.min()))
         u_hi, v_hi = min(1.0, float(feet.u_hi.max())), min(1.0, float(feet.v_hi.max()))
         wide, high = max(u_hi - u_lo, 2.0**-16), max(v_hi - v_lo, 2.0**-16)
@@ -76,7 +122,26 @@ class Lists:
         self.nbytes = self.feet.nbytes + self.entry.nbytes + self.start.nbytes
         return True
 
-    def test(self, query, ray, u, v, nearness):
+    def _cut(self, primitives, proposed, occludes):
+        """Leave out what lies behind the primitives proposed, one a cell, where these are proved to cover it."""
+        grid, feet = self.grid, self.feet
+        foot_of = np.full(primitives.n + 1, -1)
+        foot_of[feet.item] = np.arange(len(feet))
+        cell = np.flatnonzero(foot_of[proposed] >= 0)
+        foot = foot_of[proposed[cell]]
+        u, v = grid.centres()
+        low = Covers.of(self.view, primitives, feet.item[foot]).least(np.arange(len(foot)), u[cell], v[cell], grid.half_u, grid.half_v)
+        sure = np.flatnonzero((low > -np.inf) & occludes(low, feet.nearest.take(foot)))
+        hidden = np.full(len(u), -np.inf)
+        hidden[cell[sure]], self.covered[cell[sure]] = low[sure], foot[sure]
+        cell = np.repeat(np.arange(len(u)), np.diff(self.start))
+        high = nearness_in(feet, self.entry, u[cell], v[cell], grid.half_u, grid.half_v)
+        kept = np.flatnonzero(high >= hidden[cell])
+        self.entry = self.entry.take(kept)
+        self.start = np.concatenate([[0], np.cumsum(np.bincount(cell.take(kept), minlength=len(u)))])
+        self.nbytes = feet.nbytes + self.entry.nbytes + self.start.nbytes + self.covered.nbytes
+
+    def test(self, query, ray, u, v, nearness, end=None):
         """Test rays against what is listed where they pass the window.
 
         Parameters
@@ -87,10 +152,26 @@ class Lists:
         u, v : ndarray
         nearness : ndarray
             Least nearness that matters to each ray, with something to spare.
+        end : ndarray, optional
+            Greatest nearness that each ray reaches, or less.
+
+        Returns
+        -------
+        ndarray
+            Positions in `ray` of those that were not tested, since what is not listed may count: behind a full occluder lies what
+            a ray that does not pass it may meet, and what is not the nearest hit.
         """
         if self.grid is None:
-            return
+            return np.zeros(0, np.int64)
         cell = self.grid.cell(u, v)
+        refused = np.flatnonzero(self.covered.take(cell) >= 0) if self.cuts else np.zeros(0, np.int64)
+        if len(refused) and isinstance(query, Occluded) and end is not None:
+            first = self.feet.nearest.take(self.entry.take(self.start.take(cell.take(refused))))
+            refused = refused[~(end.take(refused) >= first)]
+        if len(refused):
+            tested = np.ones(len(cell), bool)
+            tested[refused] = False
+            cell, ray, u, v, nearness = (c[tested] for c in (cell, ray, u, v, nearness))
         # Cell by cell: neighbours look at the same entries, which are then at hand.
         key = np.sort(cell << 32 | np.arange(len(cell)))
         cell, order = key >> 32, key & 0xFFFFFFFF
@@ -108,6 +189,7 @@ class Lists:
 
         for which, place in in_rounds(cursor, end, matters):
             self._look(query, ray, u, v, nearness, which, self.entry.take(place))
+        return refused
 
     def _look(self, query, ray, u, v, nearness, which, foot):
         """Test pairs of rays and footprints."""
@@ -124,6 +206,25 @@ class Lists:
         keep = np.flatnonzero((near >= limit) & inside(feet, foot, own_u, own_v))
         if len(keep):
             query.test(ray.take(which.take(keep)), feet.item.take(foot.take(keep)))
+
+
+def always(low, nearest):
+    """Whatever covers a cell ends all rays there."""
+    return np.ones(len(low), bool)
+
+
+def centre_buffer(view, grid, primitives, feet):
+    """A z-buffer of the cells' centres: the primitive that is nearest there, as far as footprints tell, -1 for none."""
+    u, v = (w.astype(np.float32) for w in grid.centres())
+    best, nearest = np.full(len(u), -1), np.full(len(u), -np.inf)
+    for foot, cell in spans(feet, grid):
+        keep = np.flatnonzero(inside(feet, foot, u.take(cell), v.take(cell)))
+        foot, cell = foot.take(keep), cell.take(keep)
+        near = nearness_in(feet, foot, u.take(cell), v.take(cell), 0.0, 0.0)
+        np.maximum.at(nearest, cell, near)
+        won = near == nearest.take(cell)
+        best[cell[won]] = feet.item[foot[won]]
+    return best
 
 
 def in_rounds(cursor, end, matters):

@@ -35,6 +35,11 @@ class Grid:
         du, dv = (u_hi - u_lo) / columns, (v_hi - v_lo) / rows
         return cls(columns, rows, u_lo + 0.5 * du, v_lo + 0.5 * dv, du, dv, 0.5 * du, 0.5 * dv)
 
+    def centres(self):
+        """u and v of all cells' centres."""
+        j, i = (a.ravel() for a in np.indices((self.rows, self.columns)))
+        return self.u0 + i * self.du, self.v0 + j * self.dv
+
     def cell(self, u, v):
         """Numbers of the cells, row by row, in which points lie; the nearest for points outside."""
         i = np.clip((u - (self.u0 - 0.5 * self.du)) / self.du, 0, self.columns - 1).astype(np.int64)

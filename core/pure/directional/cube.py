@@ -1,7 +1,5 @@
-"""The direction cube: six windows around a point, each divided adaptively into cells with lists (compare Haines and
-Greenberg 1986)."""
+"""The direction cube: six windows around a point, each divided into cells with lists (compare Haines and Greenberg 1986)."""
 
-from .quadtree import divide
 from .view import View
 
 AXES = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
@@ -16,22 +14,22 @@ class Cube:
     primitives : list of Primitive
     extra : float
         Largest coordinate of what is looked at.
-    max_depth : int
-        Levels of a face's quadtree.
+    divide : callable
+        ``divide(footprints, occludes)``: the cells of a face.
     """
 
-    def __init__(self, position, primitives, extra, max_depth):
-        self.position, self.primitives, self.extra, self.max_depth = tuple(map(float, position)), primitives, extra, max_depth
+    def __init__(self, position, primitives, extra, divide):
+        self.position, self.primitives, self.extra, self.divide = tuple(map(float, position)), primitives, extra, divide
         self.faces = {}
 
     def face(self, number):
-        """View and quadtree of one face: 0 to 5 are +x, -x, +y, -y, +z, -z."""
+        """View and cells of one face: 0 to 5 are +x, -x, +y, -y, +z, -z."""
         if number not in self.faces:
             axis, back = divmod(number, 2)
             forward = tuple(-c if back else c for c in AXES[axis])
             view = View(self.position, AXES[(axis + 1) % 3], AXES[(axis + 2) % 3], forward, extra=self.extra)
             footprints = [f for f in (view.footprint(i, p) for i, p in enumerate(self.primitives)) if f is not None]
-            self.faces[number] = view, divide(footprints, _ends, max_depth=self.max_depth)
+            self.faces[number] = view, self.divide(footprints, _ends)
         return self.faces[number]
 
     @staticmethod

@@ -11,12 +11,14 @@ from ...errors import Notice
 from ..query import Occluded
 from ..structure import Structure, memory_of
 from .cube import Cube
-from .quadtree import divide
+from .quadtree import divide, divide_evenly
 from .second import Handing
 from .view import LOSS, View, cross
 
 #: How far beside a light a ray may pass, relative to the largest coordinate; well within the footprints' own rounding.
 BESIDE = 2.0**-46
+#: Levels of an adaptive face, where no resolution is asked for.
+LEVELS = 8
 #: A ray whose light is not told is compared with so many lights.
 LIGHTS_TRIED = 16
 
@@ -30,8 +32,14 @@ class LightBuffer(Handing):
         Light's number -> buffer, the most recently used last.
     """
 
-    def build(self, progress, resolution, max_bytes):
-        self.max_depth = math.ceil(math.log2(resolution)) if resolution else 8
+    def build(self, progress, resolution, max_bytes, faces, z_buffer):
+        if faces == "adaptive":
+            levels = math.ceil(math.log2(resolution)) if resolution else LEVELS
+            self.divide = lambda footprints, *occludes: divide(footprints, *occludes, max_depth=levels)
+        else:
+            # About a cell for each primitive, as there are six faces.
+            along = resolution or min(64, max(2, math.ceil(math.sqrt(len(self.primitives) / 6))))
+            self.divide = lambda footprints, *occludes: divide_evenly(footprints, along, z_buffer, *occludes)
         self.max_bytes, self.buffers, self.bytes = max_bytes, {}, {}
         self.extra = 2.0 * max(abs(c) for p in self.primitives for c in (*p.lo, *p.hi))
         self.lights = [light for light in getattr(self.scene, "lights", ()) if _fits(light)]
@@ -54,7 +62,7 @@ class LightBuffer(Handing):
         buffer = self.buffers.get(number)
         if buffer is None:
             light = self.lights[number]
-            buffer = (_Sun if light.kind == "sun" else _Point)(light, self.primitives, self.extra, self.max_depth)
+            buffer = (_Sun if light.kind == "sun" else _Point)(light, self.primitives, self.extra, self.divide)
         place = buffer.place(query.ray)
         if place is None:
             return False
@@ -109,9 +117,9 @@ def _fits(light):
 class _Point:
     """The direction cube of a point or spot light."""
 
-    def __init__(self, light, primitives, extra, max_depth):
+    def __init__(self, light, primitives, extra, divide):
         self.extra = max(extra, *map(abs, light.position))
-        self.cube = Cube(light.position, primitives, self.extra, max_depth)
+        self.cube = Cube(light.position, primitives, self.extra, divide)
 
     @property
     def faces(self):
@@ -144,7 +152,7 @@ class _Point:
 class _Sun:
     """The parallel window of the sun."""
 
-    def __init__(self, light, primitives, extra, max_depth):
+    def __init__(self, light, primitives, extra, divide):
         length = math.hypot(*light.direction)
         forward = tuple(c / length for c in light.direction)
         least = min(range(3), key=lambda a: abs(forward[a]))
@@ -156,7 +164,7 @@ class _Sun:
         # The scene lies behind the plane where z = 0, and within the window.
         position = tuple(0.5 * (l + h) - 2.0 * radius * f for l, h, f in zip(lo, hi, forward))
         self.view = View(position, right, cross(forward, right), forward, (-radius, radius) * 2, False, extra)
-        self.primitives, self.max_depth, self.faces = primitives, max_depth, {}
+        self.primitives, self.divide, self.faces = primitives, divide, {}
 
     @property
     def parts(self):
@@ -177,6 +185,6 @@ class _Sun:
         u, v, z, along = place
         if not self.faces:
             footprints = [f for f in (self.view.footprint(i, p) for i, p in enumerate(self.primitives)) if f is not None]
-            self.faces[0] = self.view, divide(footprints, max_depth=self.max_depth)
+            self.faces[0] = self.view, self.divide(footprints)
         begin, end = z + ray.t_min * along, z + ray.t_max * along
         return (self.faces[0][1].leaf(u, v), -begin - LOSS * (abs(begin) + abs(z)), -end - LOSS * abs(end) if end > -math.inf else math.inf)

@@ -15,6 +15,8 @@ import math
 ROUNDING = 2.0**-42
 #: Nearness that is lost at most in comparisons, relative.
 LOSS = 2.0**-30
+#: Directions in the window in which corners of an inscribed box are looked for: they are the outline's corners.
+SIDES = 8
 
 
 def cross(a, b):
@@ -106,6 +108,10 @@ class View:
         footprint = Footprint(item, bounds, nearness, e)
         if len(points) == 3:
             footprint.add_edges(points, self.perspective)
+        elif hasattr(primitive, "inscribed_box"):
+            corners = primitive.inscribed_box()
+            if corners is not None:
+                footprint.add_outline([self.point(p) for p in corners], self.perspective)
         return footprint
 
 
@@ -120,16 +126,20 @@ class Footprint:
     nearest : float
         Greatest nearness: 1 / z in a perspective view, -z in a parallel one.
     edges : list of (a, b, c)
-        a u + b v + c is no less than -slack inside, and above slack it is certainly inside. Empty where nothing is sure.
+        a u + b v + c is no less than -slack inside. Empty where nothing is sure.
     plane : tuple (a, b, c), or None
         Nearness at (u, v) is a u + b v + c, within `loose`.
+    within : list of (a, b, c)
+        Where a u + b v + c > 0 for all of them, the primitive certainly is. Empty where nothing is sure.
+    farthest : float
+        Nearness there, at least, where there is no plane.
     """
 
-    __slots__ = ("item", "bounds", "nearest", "error", "edges", "slack", "plane", "loose")
+    __slots__ = ("item", "bounds", "nearest", "error", "edges", "slack", "plane", "loose", "within", "farthest")
 
     def __init__(self, item, bounds, nearest, error):
         self.item, self.bounds, self.nearest, self.error = item, bounds, nearest, error
-        self.edges, self.slack, self.plane, self.loose = (), 0.0, None, 0.0
+        self.edges, self.slack, self.plane, self.loose, self.within, self.farthest = (), 0.0, None, 0.0, (), -math.inf
 
     def add_edges(self, points, perspective):
         """Edges and plane of a triangle: the rows of the inverse of the matrix of its corners (Olano and Greer 1997)."""
@@ -144,9 +154,27 @@ class Footprint:
         sign = math.copysign(1.0, det)
         self.edges = [tuple(sign * c for c in n) for n in normals]
         self.slack = slack
+        self.within = [(a, b, c - slack) for a, b, c in self.edges]
         self.plane = tuple(sum(w * n[k] for w, n in zip(weight, normals)) / det for k in range(3))
         total = sum(map(abs, self.plane))
         self.loose = 4.0 * slack * (max(map(abs, weight)) + size * total) / abs(det) + LOSS * total + 2.0 * self.error * (not perspective)
+
+    def add_outline(self, points, perspective):
+        """Edges within a primitive, and its farthest nearness, from the corners of a box inscribed in it."""
+        e, near, far = self.error, min(p[2] for p in points), max(p[2] for p in points)
+        if perspective and not near > 4.0 * e:
+            return
+        places = [(x / z, y / z) if perspective else (x, y) for x, y, z in points]
+        off = 4.0 * e * ((1.0 + max(abs(u) for u, _ in places) + max(abs(v) for _, v in places)) / near if perspective else 1.0)
+        angles = [math.tau * (k + 0.5) / SIDES for k in range(SIDES)]
+        corners = [max(places, key=lambda p: math.cos(t) * p[0] + math.sin(t) * p[1]) for t in angles]
+        edges = []
+        for p, q in zip(corners, corners[1:] + corners[:1]):
+            a, b = p[1] - q[1], q[0] - p[0]
+            if p != q:
+                edges.append((a, b, -(a * p[0] + b * p[1]) - 2.0 * off * (abs(a) + abs(b))))
+        self.within = edges
+        self.farthest = (1.0 - LOSS) / (far + e) if perspective else -far - e - LOSS * abs(far)
 
     def reaches(self, cell):
         """Whether the footprint reaches into the cell (u_lo, u_hi, v_lo, v_hi); never wrongly not."""
@@ -157,12 +185,12 @@ class Footprint:
 
     def covers(self, cell):
         """Whether it certainly covers the cell."""
-        return bool(self.edges) and all(a * cell[a < 0.0] + b * cell[2 + (b < 0.0)] + c > self.slack for a, b, c in self.edges)
+        return bool(self.within) and all(a * cell[a < 0.0] + b * cell[2 + (b < 0.0)] + c > 0.0 for a, b, c in self.within)
 
     def nearness(self, cell):
         """Least and greatest nearness in a cell, at most."""
         if self.plane is None:
-            return -math.inf, self.nearest
+            return self.farthest, self.nearest
         a, b, c = self.plane
         low = a * cell[a < 0.0] + b * cell[2 + (b < 0.0)] + c - self.loose
         high = a * cell[a >= 0.0] + b * cell[2 + (b >= 0.0)] + c + self.loose
