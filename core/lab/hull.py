@@ -1,10 +1,12 @@
 """Convex hulls: how tight a volume is, is told by their area (Barber, Dobkin and Huhdanpaa 1996, Quickhull)."""
 
+import itertools
 import math
 
 import numpy as np
 
-from ..scene.scene import Mesh
+from ..fast.primitives import Primitives
+from ..scene.scene import Mesh, Object, Scene, Shapes
 
 #: Points nearer to a face than this, relative to the size of all, lie on it.
 ON = 1e-12
@@ -118,7 +120,8 @@ def area_of(obj):
     -------
     area : float
     exact : bool
-        False where curved surfaces were replaced by points on them (the area is then too small, by less than 1 %).
+        False where curved surfaces were replaced by points on them (the area is then too small, by less than 1 %), and
+        combinations by small boxes that hold them (it is then too large).
     """
     m = np.asarray(obj.matrix, float)
     if isinstance(obj.geometry, Mesh):
@@ -148,10 +151,14 @@ def _formula(solid, matrix):
 
 def _points(solid, matrix):
     """Points whose hull is the solid's, or nearly, in the world; and whether it is exactly that."""
-    from ..scene.solids import KINDS, bounds
-    if not hasattr(solid, "kind"):                      # a CSG tree: no more than its box is known
-        lo, hi = bounds(solid)
-        local, exact, m = np.array([[(lo, hi)[i >> a & 1][a] for a in range(3)] for i in range(8)]), False, matrix
+    from ..scene.solids import KINDS
+    if solid.kind == "csg":                             # no more than small boxes that hold it is known
+        kinds = Primitives.of(Scene([Object("", Shapes([solid]), matrix)]), None).kinds
+        return np.concatenate([np.stack(corner, axis=-1) for tree in kinds for lo, hi in tree.cover
+                               for corner in itertools.product(*zip(lo.T, hi.T))] or [np.zeros((0, 3))]), False
+    if solid.kind == "mesh":
+        own = solid.values["mesh"]
+        local, exact, m = own.vertices[np.unique(own.triangles)], True, matrix @ solid.matrix
     else:
         m, exact = matrix @ solid.matrix, True
         if "points" in solid.values:

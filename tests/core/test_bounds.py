@@ -245,6 +245,52 @@ def test_predicted_probabilities_are_those_of_random_lines():
             assert row["p"] == pytest.approx(row["p_predicted"], rel=rel, abs=0.003) and row["worst"] < worst, name
 
 
+@pytest.mark.parametrize("kind", KINDS)
+def test_shadows_are_hit_by_their_share_of_parallel_rays(kind):
+    """And over all directions their mean is a quarter of the surface (Cauchy); combined volumes tell upper bounds."""
+    rng = np.random.default_rng(14)
+    turn = np.linalg.qr(rng.normal(size=(3, 3)))[0] @ np.diag([1.0, 0.3, 0.6])
+    fast, pure = both(Scene([Object("", datasets.random_soup(rng, 12, 0.4).objects[0].geometry, datasets.matrix(turn, (1.0, 2.0, 3.0)))]))
+    volume = fast_bounds.maker(kind)(fast, np.arange(fast.n), np.zeros(1, np.int64))
+    alone = pure_bounds.maker(kind)(pure)
+    lo, hi = (c[0] for c in volume.boxes())
+    centre, radius = 0.5 * (lo + hi), np.linalg.norm(hi - lo)
+    for _ in range(3):
+        d = rng.normal(size=3)
+        d /= np.linalg.norm(d)
+        rays = lab.parallel_rays(d, centre, radius, 20_000, rng)
+        hit = len(volume.enter(volume.of_rays(rays), np.arange(rays.n), np.zeros(rays.n, np.int64), rays.t_max)[0]) / rays.n
+        told = volume.projected(d)[0] / (math.pi * radius**2)
+        assert alone.projected(d.tolist()) == pytest.approx(volume.projected(d)[0], rel=1e-9)
+        assert hit < told + 0.02 if "&" in kind or "|" in kind else hit == pytest.approx(told, abs=0.015)
+    d = rng.normal(size=(2000, 3))
+    d /= np.linalg.norm(d, axis=1, keepdims=True)
+    if "&" not in kind and "|" not in kind:
+        assert np.mean([volume.projected(x)[0] for x in d[:: 1 if len(volume.own) < 10 else 50]]) == pytest.approx(volume.area()[0] / 4, rel=0.03 if len(volume.own) < 10 else 0.1)
+
+
+def test_predicted_probabilities_along_one_direction():
+    rng = np.random.default_rng(5)
+    scene = datasets.random_soup(rng, 60, 0.15)
+    direction = np.array([0.6, -0.48, 0.64])
+    for name, parameters in lab.TREES:
+        index = build(scene, name, **parameters)
+        rows = lab.levels(index, lab.rays_around(index, direction, 10_000, rng), direction=direction)
+        assert len(rows) > 1
+        for row in rows:
+            assert row["p"] == pytest.approx(row["p_predicted"], rel=0.1, abs=0.005) and row["worst"] < 0.1, name
+
+
+def test_what_volumes_are_worth_around_combinations_and_in_the_pure_core():
+    cup = solids.difference(solids.cylinder((0, 0, 0), (0, 0, 1), 0.5), solids.sphere((0, 0, 1), 0.4))
+    scene = Scene([Object("cup", Shapes([cup, solids.sphere((3, 0, 0), 0.1)]))])
+    for row in lab.bounds(scene, n_rays=200, repeats=2)["rows"]:
+        assert row["B_pure"] > row["B"] > 0 and row["I_pure"] > row["I"] > 0 and row["with_pure"] == pytest.approx(row["B_pure"] + row["p"] * row["I_pure"])
+        assert 0 < row["p_d"] <= 1 and 0 < row["p_d_predicted"] <= 1 and row["tightness"] > 0.5
+        if row["kind"] in ("aabb", "kdop-6"):
+            assert row["p_d"] == row["p_d_predicted"] == pytest.approx(1.0)
+
+
 def test_hits_of_a_polygon_not_quite_planar_are_in_its_box():
     rng = np.random.default_rng(5)
     angle = np.sort(rng.uniform(0.0, 2.0 * np.pi, 9))

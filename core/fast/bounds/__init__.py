@@ -131,6 +131,10 @@ class Volumes:
         """Surface areas, shape (n,)."""
         raise NotImplementedError
 
+    def projected(self, direction):
+        """Areas of the shadows that the volumes cast along a unit vector, shape (n,)."""
+        raise NotImplementedError
+
     #: What Cells call volumes of this kind.
     DRAWN = "box"
 

@@ -34,6 +34,9 @@ class Aabbs(Volumes):
     def area(self):
         return box_area(self.own[3:] - self.own[:3])
 
+    def projected(self, direction):
+        return box_shadow(self.own[3:] - self.own[:3], np.abs(direction))
+
     def boxes(self):
         return self.own[:3].T, self.own[3:].T
 
@@ -42,3 +45,9 @@ def box_area(size):
     """Surface areas of boxes whose edges are `size`, shape (3, n)."""
     x, y, z = size
     return 2.0 * (x * y + y * z + z * x)
+
+
+def box_shadow(size, cosine):
+    """Areas of the shadows of boxes whose edges are `size`, shape (3, n), by the cosines of their angles to the light."""
+    x, y, z = size
+    return cosine[0] * y * z + cosine[1] * z * x + cosine[2] * x * y

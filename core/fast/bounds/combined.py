@@ -3,7 +3,7 @@
 import numpy as np
 
 from . import Volumes, columns, maker, margins, meets
-from .aabb import Aabbs
+from .aabb import Aabbs, box_shadow
 
 
 class _Combined(Volumes):
@@ -57,6 +57,10 @@ class Intersections(_Combined):
         """An upper bound: the least of the parts' areas (what lies in a convex volume has no larger surface)."""
         return np.minimum.reduce([p.area() for p in self.parts])
 
+    def projected(self, direction):
+        """An upper bound: the least of the parts' shadows."""
+        return np.minimum.reduce([p.projected(direction) for p in self.parts])
+
     def boxes(self):
         boxes = [p.boxes() for p in self.parts]
         return np.maximum.reduce([b[0] for b in boxes]), np.minimum.reduce([b[1] for b in boxes])
@@ -100,6 +104,11 @@ class Unions(_Combined):
         lo, hi = self.boxes()
         x, y, z = (hi - lo).T
         return np.minimum(sum(p.area() for p in self.parts), 2.0 * (x * y + y * z + z * x))
+
+    def projected(self, direction):
+        """An upper bound: the sum of the parts' shadows, or that of the box around both where it is less."""
+        lo, hi = self.boxes()
+        return np.minimum(sum(p.projected(direction) for p in self.parts), box_shadow((hi - lo).T, np.abs(direction)))
 
     def boxes(self):
         boxes = [p.boxes() for p in self.parts]

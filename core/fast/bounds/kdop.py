@@ -7,7 +7,6 @@ import numpy as np
 
 from ...hits import KDOP_AXES as AXES
 from . import EPSILON, Volumes, between, columns, margins
-from .aabb import box_area
 
 #: Corners and edges that coincide but for this, relative to the size, are one (areas only).
 COINCIDE = 1e-12
@@ -61,15 +60,24 @@ class KDops(Volumes):
         return t_in, t_out
 
     def area(self):
-        return np.concatenate([_area(self.own[:, i:i + AREAS]) for i in range(0, len(self), AREAS)])
+        return self._faces(np.ones(len(self.own)))
+
+    def projected(self, direction):
+        # Half of the faces are turned to the light; each one's shadow is smaller by the cosine.
+        normals = np.array(AXES[len(self.own)] * 2, float)
+        return self._faces(0.5 * np.abs(normals @ direction) / np.sqrt((normals * normals).sum(axis=1)))
+
+    def _faces(self, weight):
+        """Sums of the faces' areas by their weights, shape (k,)."""
+        return np.concatenate([_area(self.own[:, i:i + AREAS], weight) for i in range(0, len(self), AREAS)])
 
     def boxes(self):
         half = len(self.own) // 2
         return self.own[:3].T, self.own[half:half + 3].T
 
 
-def _area(columns):
-    """Surface areas of k-DOPs.
+def _area(columns, weight):
+    """Surface areas of k-DOPs, each face's area by a weight.
 
     Where two faces meet, their common line is cut by all other slabs to an edge; a face's area is half the sum of its
     edges times their distances from one point in its plane. Directions are the same for all, so only the distances of
@@ -77,7 +85,8 @@ def _area(columns):
     """
     half = len(columns) // 2
     if half == 3:
-        return box_area(columns[3:] - columns[:3])
+        x, y, z = columns[3:] - columns[:3]
+        return (weight[0] + weight[3]) * (y * z) + (weight[1] + weight[4]) * (z * x) + (weight[2] + weight[5]) * (x * y)
     normals, lines = _lines(2 * half)
     # Measured from the middle, or everything cancels far from the origin.
     middle = 0.5 * (columns[:3] + columns[half:half + 3])
@@ -104,7 +113,8 @@ def _area(columns):
             if len(cuts[name][0]):
                 misses |= (room(cuts[name]) < least).any(axis=0)
         length = np.where(misses, 0.0, np.maximum(length, 0.0)) * np.sqrt(ee)
-        area += 0.5 * length * ((d[g] - d[f] * fg / ff) / np.sqrt(gg - fg * fg / ff) + (d[f] - d[g] * fg / gg) / np.sqrt(ff - fg * fg / gg))
+        area += 0.5 * length * (weight[f] * (d[g] - d[f] * fg / ff) / np.sqrt(gg - fg * fg / ff)
+                                + weight[g] * (d[f] - d[g] * fg / gg) / np.sqrt(ff - fg * fg / gg))
     return area
 
 

@@ -3,7 +3,7 @@
 import numpy as np
 
 from . import EPSILON, Volumes, between, columns, margins
-from .aabb import box_area
+from .aabb import box_area, box_shadow
 from .hull import balls
 
 #: Rounds of Jacobi's method: it converges quadratically.
@@ -54,6 +54,10 @@ class Obbs(Volumes):
 
     def area(self):
         return box_area(self.own[12:] - self.own[9:12])
+
+    def projected(self, direction):
+        x, y, z = direction
+        return box_shadow(self.own[12:] - self.own[9:12], np.abs([self.own[k] * x + self.own[k + 1] * y + self.own[k + 2] * z for k in (0, 3, 6)]))
 
     def boxes(self):
         axes = self.own[:9].reshape(3, 3, -1)

@@ -53,6 +53,9 @@ class Spheres(Volumes):
     def area(self):
         return 4.0 * np.pi * self.own[3] ** 2
 
+    def projected(self, direction):
+        return np.pi * self.own[3] ** 2
+
     def boxes(self):
         return (self.own[:3] - self.own[3]).T, (self.own[:3] + self.own[3]).T
 

@@ -61,6 +61,10 @@ class Volume:
         """Surface area."""
         raise NotImplementedError
 
+    def projected(self, direction):
+        """Area of the shadow that the volume casts along a unit vector."""
+        raise NotImplementedError
+
     #: What Cells call volumes of this kind.
     DRAWN = "box"
 

@@ -39,6 +39,9 @@ class Aabb(Volume):
     def area(self):
         return box_area(self.lo, self.hi)
 
+    def projected(self, direction):
+        return box_shadow(self.lo, self.hi, direction)
+
     def box(self):
         return self.lo, self.hi
 
@@ -47,3 +50,9 @@ def box_area(lo, hi):
     """Surface area of a box."""
     x, y, z = (h - l for l, h in zip(lo, hi))
     return 2.0 * (x * y + y * z + z * x)
+
+
+def box_shadow(lo, hi, cosine):
+    """Area of the shadow of a box, by the cosines of its edges' angles to the light."""
+    x, y, z = (h - l for l, h in zip(lo, hi))
+    return abs(cosine[0]) * y * z + abs(cosine[1]) * z * x + abs(cosine[2]) * x * y

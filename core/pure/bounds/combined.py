@@ -1,7 +1,7 @@
 """Combined volumes: intersections and unions of simpler ones."""
 
 from . import Margin, Volume, maker
-from .aabb import Aabb, box_area
+from .aabb import Aabb, box_area, box_shadow
 
 
 class _Combined(Volume):
@@ -41,6 +41,10 @@ class Intersection(_Combined):
         """An upper bound: the least of the parts' areas (what lies in a convex volume has no larger surface)."""
         return min(p.area() for p in self.parts)
 
+    def projected(self, direction):
+        """An upper bound: the least of the parts' shadows."""
+        return min(p.projected(direction) for p in self.parts)
+
     def box(self):
         boxes = [p.box() for p in self.parts]
         return tuple(map(max, *(lo for lo, _ in boxes))), tuple(map(min, *(hi for _, hi in boxes)))
@@ -77,6 +81,10 @@ class Union(_Combined):
     def area(self):
         """An upper bound: the sum of the parts' areas, or that of the box around both where it is less."""
         return min(sum(p.area() for p in self.parts), box_area(*self.box()))
+
+    def projected(self, direction):
+        """An upper bound: the sum of the parts' shadows, or that of the box around both where it is less."""
+        return min(sum(p.projected(direction) for p in self.parts), box_shadow(*self.box(), direction))
 
     def box(self):
         boxes = [p.box() for p in self.parts]

@@ -7,7 +7,6 @@ import math
 from ...hits import KDOP_AXES as AXES
 from ..ray import EPSILON
 from . import Margin, Volume, margin_of
-from .aabb import box_area
 
 BOX = [(1, 0, 0), (0, 1, 0), (0, 0, 1)]
 #: Corners and edges that coincide but for this, relative to the size, are one (areas only).
@@ -64,11 +63,22 @@ class KDop(Volume):
         return t_in, t_out
 
     def area(self):
-        """Where two faces meet, their common line is cut by all other slabs to an edge; a face's area is half the sum of
-        its edges times their distances from one point in its plane."""
+        return self._faces([1.0] * (2 * len(self.low)))
+
+    def projected(self, direction):
+        # Half of the faces are turned to the light; each one's shadow is smaller by the cosine.
+        return self._faces([0.5 * abs(_dot(n, direction)) / math.sqrt(_dot(n, n)) for n in _normals(2 * len(self.low))])
+
+    def _faces(self, weight):
+        """The sum of the faces' areas by their weights.
+
+        Where two faces meet, their common line is cut by all other slabs to an edge; a face's area is half the sum of its
+        edges times their distances from one point in its plane.
+        """
         half = len(self.low)
         if half == 3:
-            return box_area(self.low, self.high)
+            x, y, z = (h - l for l, h in zip(self.low, self.high))
+            return (weight[0] + weight[3]) * (y * z) + (weight[1] + weight[4]) * (z * x) + (weight[2] + weight[5]) * (x * y)
         # Measured from the middle, or everything cancels far from the origin.
         middle = [0.5 * (l + h) for l, h in zip(self.low[:3], self.high[:3])]
         normals = _normals(2 * half)
@@ -90,8 +100,8 @@ class KDop(Volume):
                 if begin >= end:
                     break
             else:
-                area += 0.5 * (end - begin) * math.sqrt(ee) * ((d[g] - d[f] * fg / ff) / math.sqrt(gg - fg * fg / ff)
-                                                              + (d[f] - d[g] * fg / gg) / math.sqrt(ff - fg * fg / gg))
+                area += 0.5 * (end - begin) * math.sqrt(ee) * (weight[f] * (d[g] - d[f] * fg / ff) / math.sqrt(gg - fg * fg / ff)
+                                                              + weight[g] * (d[f] - d[g] * fg / gg) / math.sqrt(ff - fg * fg / gg))
         return area
 
     def shape(self):

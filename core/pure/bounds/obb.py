@@ -4,7 +4,7 @@ import math
 
 from ..ray import EPSILON
 from . import Margin, Volume
-from .aabb import box_area
+from .aabb import box_area, box_shadow
 from .hull import balls
 from .kdop import BOX, between
 
@@ -59,6 +59,9 @@ class Obb(Volume):
 
     def area(self):
         return box_area(self.low, self.high)
+
+    def projected(self, direction):
+        return box_shadow(self.low, self.high, [sum(x * y for x, y in zip(axis, direction)) for axis in self.axes])
 
     def shape(self):
         return (*self.axes[0], *self.axes[1], *self.axes[2], *self.low, *self.high)

@@ -58,6 +58,9 @@ class Sphere(Volume):
     def area(self):
         return 4.0 * math.pi * self.radius * self.radius
 
+    def projected(self, direction):
+        return math.pi * self.radius * self.radius
+
     def shape(self):
         return (*self.centre, self.radius)
 
