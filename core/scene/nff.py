@@ -11,6 +11,7 @@ T, ior          transmission, index of refraction; constants, without Fresnel
 light           point light without falloff; of n lights each gives 1 / sqrt(n): irradiance pi / sqrt(n) times its colour
 background      the world's colour; there is no ambient light
 c               cylinder or cone without caps
+pp              smooth triangles; a patch of more corners is divided into such
 ==============  ========================================================================================================
 """
 
@@ -112,7 +113,6 @@ class Reader:
         self.name, self.lines, self.at = name, text.splitlines(), 0
         self.view, self.lights, self.solids, self.notices, self.unnamed = {}, [], [], [], 0
         self.background, self.fills, self.slot = (0.0, 0.0, 0.0), {}, 0
-        self.smooth_left_out = 0
         self.readers = {"b": self._background, "l": self._light, "f": self._fill, "s": self._sphere, "c": self._cone,
                         "p": self._polygon, "pp": self._patch, "v": lambda words: None}
 
@@ -146,9 +146,6 @@ class Reader:
         """The scene from what was read."""
         if self.unnamed:
             self.notices.append(Notice(self.name, f"{self.unnamed} more lines cannot be read; they were left out."))
-        if self.smooth_left_out:
-            self.notices.append(Notice(self.name, f"{self.smooth_left_out} patches (pp) have more than three corners; their normals are "
-                                       "not used, they look flat. Divide them into triangles."))
         return scene_of(self.name, self.solids, self.fills, self.lights, self.background, self._camera(), self.notices)
 
     def _camera(self):
@@ -222,9 +219,7 @@ class Reader:
 
     def _patch(self, words):
         corners = self._corners(words, 6)
-        if len(corners) > 3:
-            self.smooth_left_out += 1
-        self.solids.append(solids.polygon([c[:3] for c in corners], [c[3:] for c in corners], slot=self.slot))
+        self.solids += solids.patch([c[:3] for c in corners], [c[3:] for c in corners], slot=self.slot)
 
     def _corners(self, words, width):
         """The corners of a polygon, each on a line of its own."""

@@ -200,16 +200,61 @@ def polygon(points, normals=None, **more):
     Parameters
     ----------
     points : array_like, shape (k, 3)
-    normals : array_like, shape (k, 3), optional
-        Shading normals at the corners.
+    normals : array_like, shape (3, 3), optional
+        Shading normals at the corners of a triangle; for more corners see :func:`patch`.
     """
-    points = np.asarray(points, float)
+    points = np.asarray(points, float) if len(points) else np.zeros((0, 3))
     if points.ndim != 2 or points.shape[1] != 3:
         raise SceneError(f"{more.get('name') or 'polygon'}: corners have the shape (k, 3), not {points.shape}.")
     values = {"points": points}
     if normals is not None:
         values["normals"] = np.asarray(normals, float).reshape(points.shape)
     return Solid("triangle" if len(points) == 3 else "polygon", _IDENTITY.copy(), values=values, **more)
+
+
+def patch(points, normals, **more):
+    """A polygon with shading normals at its corners, as smooth triangles: ears cut off one by one (Meisters 1975).
+
+    Parameters
+    ----------
+    points, normals : array_like, shape (k, 3)
+        As for :func:`polygon`.
+
+    Returns
+    -------
+    list of Solid
+        k - 2 triangles; of a polygon that has no ears, because it is not simple or has no area, the polygon, flat.
+    """
+    points, normals = np.asarray(points, float).reshape(-1, 3), np.asarray(normals, float).reshape(-1, 3)
+    triangles = _ears(points) if len(points) > 3 else [range(len(points))]
+    if triangles is None:
+        return [polygon(points, **more)]
+    return [polygon(points[list(t)], normals[list(t)], **more) for t in triangles]
+
+
+def _ears(points):
+    """Triples of corners that make up a simple polygon, or None."""
+    following = np.roll(points, -1, axis=0)
+    normal = np.cross(points - points[0], following - points[0]).sum(axis=0)
+    axis = int(np.abs(normal).argmax())
+    x, y = points[:, (axis + 1) % 3].tolist(), points[:, (axis + 2) % 3].tolist()
+    turn = math.copysign(1.0, normal[axis])
+
+    def side(a, b, c):
+        return turn * ((x[b] - x[a]) * (y[c] - y[a]) - (y[b] - y[a]) * (x[c] - x[a]))
+
+    rest, triangles = list(range(len(points))), []
+    while len(rest) > 3:
+        for k, b in enumerate(rest):
+            a, c = rest[k - 1], rest[(k + 1) % len(rest)]
+            others = (p for p in rest if p not in (a, b, c) and (x[p], y[p]) not in ((x[a], y[a]), (x[c], y[c])))
+            if side(a, b, c) > 0.0 and not any(side(a, b, p) >= 0.0 and side(b, c, p) >= 0.0 and side(c, a, p) >= 0.0 for p in others):
+                triangles.append((a, b, c))
+                del rest[k]
+                break
+        else:
+            return None
+    return [*triangles, tuple(rest)]
 
 
 def _columns(x, y, z, origin):

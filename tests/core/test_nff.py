@@ -68,6 +68,41 @@ def test_a_file_with_everything(tmp_path, name):
     assert not obj.geometry.corner_normals[:5].any()
 
 
+PATCH = """pp 6
+0 0 0 -0.6 0 0.8
+2 0 0 0.6 0 0.8
+2 2 0 0.6 0 0.8
+1 2 0 0 0 1
+1 1 0 0 0 1
+0 1 0 -0.6 0 0.8
+"""
+
+
+def test_patches_of_many_corners_are_smooth(tmp_path):
+    """An L: normals lean by x, linearly, in every triangle of it; its notch stays open."""
+    scene = read(tmp_path, VIEW + PATCH)
+    some = scene.objects[0].geometry
+    assert not scene.notices and len(some) == 4 and all(s.kind == "triangle" for s in some.solids)
+    area = [0.5 * np.linalg.norm(np.cross(*(s.values["points"][1:] - s.values["points"][0]))) for s in some.solids]
+    assert sum(area) == pytest.approx(3.0) and min(area) > 0
+    x, y = (c.ravel() for c in np.meshgrid(np.linspace(0.05, 1.95, 12), np.linspace(0.05, 1.95, 12)))
+    for core in ("fast", "pure"):
+        hits = build(scene, "brute", core).closest(np.column_stack([x, y, 0 * x + 1]).tolist(), [(0, 0, -1)] * 144)
+        assert np.array_equal(np.isfinite(np.asarray(hits.t)), ~((x < 1) & (y > 1)))
+        met = np.flatnonzero(np.asarray(hits.primitive) >= 0)
+        a, b, c = some.corner_normals[np.asarray(hits.primitive)[met]].transpose(1, 2, 0)
+        u, v = np.asarray(hits.u)[met], np.asarray(hits.v)[met]
+        np.testing.assert_allclose((a * (1 - u - v) + b * u + c * v)[0], 0.6 * (x[met] - 1), atol=1e-6)
+
+
+def test_a_patch_that_is_no_polygon_stays_flat_or_is_named(tmp_path):
+    bow = "pp 4\n0 0 0 0 0 1\n1 1 0 0 0 1\n1 0 0 0 0 1\n0 1 0 0 0 1\n"
+    assert [s.kind for s in read(tmp_path, VIEW + bow).objects[0].geometry.solids] == ["polygon"]
+    for text in ("p 0\n", "pp 0\n", "pp 2\n0 0 0 0 0 1\n1 0 0 0 0 1\n"):
+        scene = read(tmp_path, VIEW + text + "s 0 0 0 1\n")
+        assert "distinct corners, three are needed" in scene.notices[0].text and scene.n_primitives == 2
+
+
 def test_the_view(tmp_path):
     camera = read(tmp_path, VIEW + SHAPES).camera
     assert camera.near == 0.5
