@@ -108,13 +108,13 @@ class Bsp:
         number = np.append(first[1:], len(node)) - first
         best, plane = np.full(m, np.inf), np.zeros((m, 4))
         side = np.zeros(points.shape[:2], np.int8)
-        for own in self._candidates(points, node, planes, first, number):
+        for own, usable in self._candidates(points, node, planes, first, number):
             tried = sides(_height(points, own[node]), self.tolerance)
             low, high = tried.min(axis=1) < 0, tried.max(axis=1) > 0
             under, over = np.bincount(node, low, m), np.bincount(node, high, m)
             score = CUT * np.bincount(node, low & high, m) + np.abs(under - over)
             # A plane that leaves all faces on one side does nothing.
-            better = (score < best) & (np.maximum(under, over) < number)
+            better = (score < best) & (np.maximum(under, over) < number) & usable
             best[better], plane[better] = score[better], own[better]
             mine = better[node]
             side[mine] = tried[mine]
@@ -122,16 +122,16 @@ class Bsp:
 
     @staticmethod
     def _candidates(points, node, planes, first, number):
-        """Planes to try, one a node: those of faces, evenly from the list, then the medians of their centres."""
+        """Planes to try, one a node, and where: those of faces, evenly from the list, then medians of many faces' centres."""
         for k in range(min(CANDIDATES, int(number.max()))):
-            yield planes[first + np.where(number <= CANDIDATES, np.minimum(k, number - 1), k * number // CANDIDATES)]
+            yield planes[first + np.where(number <= CANDIDATES, np.minimum(k, number - 1), k * number // CANDIDATES)], True
         if number.max() > CANDIDATES:
             centre = 0.5 * (points.min(axis=1) + points.max(axis=1))
             for axis in range(3):
                 order = np.lexsort([centre[:, axis], node])
                 plane = np.zeros((len(first), 4))
                 plane[:, axis], plane[:, 3] = 1.0, -centre[order[first + number // 2], axis]
-                yield plane
+                yield plane, number > CANDIDATES
 
     def __len__(self):
         return len(self.first)

@@ -8,6 +8,7 @@ in smooth-shaded (curved) mirrors and in glass at grazing angles, soft shadows, 
 
 import numpy as np
 
+from ...beams import fragments_notice
 from ..tracing import sampling
 from ..tracing.secondary import mirrored_and_refracted
 from ..tracing.whitted import KINDS, PRIMARY, REFLECTED, REFRACTED, TRANSPARENT, Wave, Whitted
@@ -29,24 +30,17 @@ class BeamTracer(Whitted):
     antialiases = True
     tree = None
 
-    def __init__(self, scene, structures, size, *more, **options):
-        super().__init__(scene, structures, size, *more, **options)
+    def __init__(self, scene, structures, *more, **options):
+        super().__init__(scene, structures, *more, **options)
         self.structure = structures["primary"]
-        self.structure.check_memory()
         #: Numbers of the lights whose shadows have hard edges.
         self.hard = [k for k, (light, _) in enumerate(self.lights) if light.shadows and not (self.soft and light.has_extent)]
 
     @property
     def notices(self):
         """What cannot be done as asked; more is known when the first tile was traced."""
-        found = list(self.structure.notices)
-        if self.tree is not None and self.tree.full and self.tree.bsp is not None:
-            from ...errors import Notice
-
-            most = self.tree.most
-            found.append(Notice("beams", f"there are more than max_fragments = {most} fragments; what lies beyond is traced by "
-                                "sampled rays. Raise max_fragments, or lower the depth."))
-        return found
+        crowded = self.tree is not None and self.tree.full and self.tree.bsp is not None
+        return [*self.structure.notices, *([fragments_notice(self.tree.most)] if crowded else [])]
 
     def grow(self):
         """Cast all beams."""
@@ -278,7 +272,7 @@ class BeamTracer(Whitted):
             wave, hits, at = self._as_wave(above, mirror, xy[later], share[later], pixel[later], None if key is None else key[later])
             for kind in (REFLECTED, REFRACTED, TRANSPARENT):
                 mine = np.flatnonzero(tree.beams.kind[own] == kind)
-                waves += self._sent(wave, hits, at, mine, (kind,))
+                waves += self._going_on(wave, hits, at, mine, (kind,))
         return waves
 
     def _bounced(self, pieces, some):
@@ -293,8 +287,8 @@ class BeamTracer(Whitted):
         key = sampling.branch(key, 0) if self.soft or self.roulette else None
         wave, hits, at = self._as_wave(pieces.beam[which], pieces.surface[which], xy, share, pieces.pixel[which], key)
         kinds = (REFLECTED, REFRACTED)
-        waves = self._sent(wave, hits, at, np.flatnonzero(wave.depth < self.depth), kinds)
-        return waves + self._sent(wave, hits, at, np.flatnonzero(pieces.polygon[which] >= tree.followed), (TRANSPARENT,))
+        waves = self._going_on(wave, hits, at, np.flatnonzero(wave.depth < self.depth), kinds)
+        return waves + self._going_on(wave, hits, at, np.flatnonzero(pieces.polygon[which] >= tree.followed), (TRANSPARENT,))
 
     def _as_wave(self, beam, surface, xy, share, pixel, key):
         """Rays as they meet surfaces in beams: wave, hits, surfaces."""
@@ -310,7 +304,7 @@ class BeamTracer(Whitted):
                     tree.beams.depth[beam].astype(np.int32), kind, key)
         return wave, hits, at
 
-    def _sent(self, wave, hits, at, some, kinds):
+    def _going_on(self, wave, hits, at, some, kinds):
         """Waves of some kinds of ray from surfaces."""
         if not len(some):
             return []

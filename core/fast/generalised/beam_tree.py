@@ -55,7 +55,7 @@ class BeamTree:
     fragments : Fragments
         Each a node of the tree: its beam, its surface, and `source`, the fragment above it.
     level : ndarray
-        Of each fragment.
+        Of each fragment: how many are above it.
     sampled : ndarray, sorted
         Keys of beams and surfaces (see :meth:`key`) whose reflections and refractions are none that beams can follow.
     lit : Fragments
@@ -76,7 +76,7 @@ class BeamTree:
 
     def __init__(self, scene, faces, bsp, surfaces, size, depth, most, check, lights=(), threshold=0.0):
         self.faces, self.bsp, self.surfaces, self.depth, self.most, self.check = faces, bsp, surfaces, depth, most, check
-        self.threshold = threshold
+        self.size, self.threshold = size, threshold
         self.n = len(faces.object)
         self.plane = np.concatenate([faces.normal, -(faces.normal * faces.anchor).sum(axis=1)[:, None]], axis=1)
         self.unknown = self.n + len(faces.box_lo)

@@ -7,77 +7,46 @@ approximation; lights cast beams for their shadows. Rays by themselves are hande
 
 import numpy as np
 
-from ...errors import MemoryEstimateError, Notice
-from ...hits import Cells
-from ...memory import free_memory
+from ...beams import cells_of, check_memory, faces_notice, hidden_notice, picture_size
 from ...scene.faces import Faces
 from ..directional.second import Handing
 from ..tracing.surface import Surfaces
 from .beam_bsp import Bsp, TooMany
+from .beam_space import PRIMARY
 from .beam_tree import BeamTree
-
-#: Bytes that a fragment takes, about, with all that is made of it on the way.
-BYTES = 2_000
-#: Picture size that the overlay's tree is made for, in pixels.
-SIZE = 640
 
 
 class Beams(Handing):
-    """The polygons of a scene, from which trees of beams are cast.
+    """The polygons of a scene, from which trees of beams are cast."""
 
-    Attributes
-    ----------
-    faces : Faces
-    """
-
-    _bsp = faces = None
+    _faces = _bsp = None
 
     def build(self, progress, max_fragments, levels):
         if getattr(self.scene, "camera", None) is None:
             self.notices.append(self.needs("a camera", "Add one to see beams."))
 
-    def check_memory(self):
-        """Raise a MemoryEstimateError where max_fragments would not fit."""
+    def traverse(self, rays, query):
+        self.hand_over(rays, query)
+
+    def prepare(self, check):
+        """The faces of the scene, and their BSP tree: None where it would be too large. Made once."""
         most = self.parameters["max_fragments"]
-        need, there = most * BYTES, free_memory()
-        if need > 0.75 * there:
-            raise MemoryEstimateError(
-                f"beams: {most} fragments would take {need / 2**30:.1f} GiB of the {there / 2**30:.1f} GiB of "
-                f"memory. Set max_fragments to {int(0.5 * there / BYTES)} or less."
-            )
+        if self._faces is None:
+            check_memory(most)
+            faces = Faces.of(self.scene.objects)
+            try:
+                if len(faces) > most:
+                    raise TooMany
+                self._bsp = Bsp(faces, most, check)
+                self.figures["memory"] += self._bsp.nbytes
+            except TooMany:
+                self.notices.append(faces_notice(len(faces), most))
+            if faces.hidden:
+                self.notices.append(hidden_notice(faces.hidden))
+            self._faces = faces
+        return self._faces, self._bsp
 
-    @property
-    def bsp(self):
-        """The BSP tree, once it was made by :meth:`prepare`; None where it would be too large."""
-        return self._bsp
-
-    def prepare(self, check=lambda: None):
-        """Find the faces, and build the BSP tree over them.
-
-        Parameters
-        ----------
-        check : callable
-            Called now and then; may raise Cancelled.
-        """
-        if self.faces is not None:
-            return
-        faces, most = Faces.of(self.scene.objects), self.parameters["max_fragments"]
-        try:
-            if len(faces) > most:
-                raise TooMany
-            self._bsp = Bsp(faces, most, check)
-            self.figures["memory"] += self._bsp.nbytes
-        except TooMany:
-            self.notices.append(Notice(
-                "beams", f"cut by each other's planes, {len(faces)} polygons become more than max_fragments = {most}; everything "
-                "is traced by sampled rays. Raise max_fragments, or name another technique."))
-        if faces.hidden:
-            self.notices.append(Notice(
-                "beams", f"{', '.join(faces.hidden)}: beams know triangles and polygons only, so the pixels where these are seen, and "
-                "what they may shade, are traced by sampled rays."))
-        self.faces = faces
-
-    def tree(self, size, depth, check=lambda: None, **more):
+    def tree(self, size, depth, check=lambda: None, surfaces=None, **more):
         """The beam tree of the camera's picture.
 
         Parameters
@@ -86,13 +55,35 @@ class Beams(Handing):
         depth : int
             Reflections and refractions in a row, at most.
         check : callable
+            Called now and then; may raise Cancelled.
+        surfaces : Surfaces, optional
         **more
-            See :class:`BeamTree`.
+            Lights and threshold; see :class:`BeamTree`.
         """
-        self.prepare(check)
-        surfaces = more.pop("surfaces", None) or Surfaces(self.scene)
-        most = self.parameters["max_fragments"]
-        return BeamTree(self.scene, self.faces, self._bsp, surfaces, size, depth, most, check, **more)
+        faces, bsp = self.prepare(check)
+        surfaces = surfaces or Surfaces(self.scene)
+        return BeamTree(self.scene, faces, bsp, surfaces, size, depth, self.parameters["max_fragments"], check, **more)
 
-    def traverse(self, rays, query):
-        self.hand_over(rays, query)
+    def cells(self):
+        """The beam tree, as deep as the parameter `levels` says: a cell from each mirror, or the eye, to what is seen."""
+        camera = getattr(self.scene, "camera", None)
+        if camera is None or not self.primitives.n:
+            return super().cells()
+        tree = self.tree(picture_size(camera), self.parameters["levels"])
+        found, beams = tree.fragments, tree.beams
+        own = np.flatnonzero((found.surface >= 0) & (found.surface < tree.n))
+        number = np.full(len(found), -1)
+        number[own] = np.arange(len(own))
+        v = found.points.shape[1]
+        beam, xy = np.repeat(found.beam[own], v), found.points[own].reshape(-1, 2)
+        far = beams.at(beam, tree.plane[np.repeat(found.surface[own], v)], xy)
+        near = np.empty_like(far)
+        first = beams.kind[beam] == PRIMARY
+        near[first] = camera.rays(*xy[first].T, tree.size)[0]
+        near[~first] = beams.at(beams.parent[beam[~first]], tree.plane[beams.mirror[beam[~first]]], xy[~first])
+        parent = np.where(found.source[own] >= 0, number[found.source[own]], -1)
+        ends = list(zip(near.reshape(-1, v, 3), far.reshape(-1, v, 3)))
+        cells = cells_of(ends, tree.level[own], parent)
+        leaves = int(np.count_nonzero(cells.leaf))
+        self.figures.update(N_G=len(cells) - leaves, N_E=leaves, N_EE=0, N_ER=leaves, depth=int(tree.level.max(initial=0)))
+        return cells

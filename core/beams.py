@@ -1,0 +1,80 @@
+"""What both cores' beams share: limits, what is said about them, and the beam tree as cells for the overlay."""
+
+import numpy as np
+
+from .errors import MemoryEstimateError, Notice
+from .hits import Cells
+from .memory import free_memory
+
+#: Bytes that a fragment takes, about, with all that is made of it on the way.
+BYTES = 2_000
+#: Width in pixels of the picture that the overlay's tree is made for.
+WIDTH = 640
+
+
+def check_memory(most):
+    """Raise a MemoryEstimateError where `most` fragments would not fit."""
+    need, there = most * BYTES, free_memory()
+    if need > 0.75 * there:
+        raise MemoryEstimateError(
+            f"beams: {most} fragments would take {need / 2**30:.1f} GiB of the {there / 2**30:.1f} GiB of memory. "
+            f"Set max_fragments to {int(0.5 * there / BYTES)} or less."
+        )
+
+
+def hidden_notice(kinds):
+    """What is said of primitives that beams do not know."""
+    return Notice(
+        "beams",
+        f"{', '.join(kinds)}: beams know triangles and polygons only; the pixels where these are seen, and what they may "
+        "shade, are traced by sampled rays.",
+    )
+
+
+def faces_notice(n, most):
+    """What is said where the BSP tree would be too large."""
+    return Notice(
+        "beams",
+        f"cut by each other's planes, {n} polygons become more than max_fragments = {most}; everything is traced by "
+        "sampled rays. Raise max_fragments, or name another technique.",
+    )
+
+
+def fragments_notice(most):
+    """What is said where there were too many fragments."""
+    return Notice(
+        "beams",
+        f"there are more than max_fragments = {most} fragments; what lies beyond is traced by sampled rays. "
+        "Raise max_fragments, or lower the depth.",
+    )
+
+
+def picture_size(camera):
+    """Size in pixels of the picture that the overlay's tree is made for."""
+    left, right, bottom, top = camera.window
+    return WIDTH, max(1, round(WIDTH * abs((top - bottom) / (right - left))))
+
+
+def cells_of(ends, level, parent):
+    """The nodes of a beam tree as cells.
+
+    Parameters
+    ----------
+    ends : list of (list, list)
+        World corners of each node at the beam's start, and at the surface that it sees.
+    level, parent : sequence of int
+
+    Returns
+    -------
+    Cells
+        With the volume "beam".
+    """
+    if not len(ends):
+        return Cells.make([], [], [], [], [], [])
+    width = max(len(end) for _, end in ends)
+    shape = np.array([[[*side, *[side[0]] * (width - len(side))] for side in pair] for pair in ends], float)
+    leaf = ~np.isin(np.arange(len(ends)), parent)
+    points = shape.reshape(len(ends), -1, 3)
+    return Cells.make(
+        points.min(axis=1), points.max(axis=1), level, np.ones(len(ends)), leaf, parent, "beam", shape.reshape(len(ends), -1)
+    )

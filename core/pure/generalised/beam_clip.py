@@ -1,0 +1,89 @@
+"""Convex polygons: cutting them by lines and planes, their areas and centres, the pixels they cover.
+
+A polygon is a list of points with two or three coordinates, counter-clockwise. A cut gives both sides the same two
+points, so areas are conserved to their last digits; what is narrower than a tolerance is not cut off but stays with its
+neighbour.
+"""
+
+import math
+
+from .clipping import clip, moments
+
+
+def sides(distances, tolerance):
+    """-1, 0 or 1 for corners beyond, on and before a line."""
+    return [(d > tolerance) - (d < -tolerance) for d in distances]
+
+
+def cut(points, distances, side):
+    """Cut a polygon that has corners on both sides.
+
+    Parameters
+    ----------
+    points : list of tuple
+    distances : list of float
+        Of the corners from the line or plane.
+    side : list of int
+        See :func:`sides`.
+
+    Returns
+    -------
+    inside, outside : list of tuple
+        The parts where the distance is positive, and where it is negative.
+    """
+    inside, outside = [], []
+    for i, (p, s) in enumerate(zip(points, side)):
+        if s >= 0:
+            inside.append(p)
+        if s <= 0:
+            outside.append(p)
+        k = (i + 1) % len(points)
+        if s * side[k] < 0:
+            share = distances[i] / (distances[i] - distances[k])
+            crossing = tuple(x + share * (y - x) for x, y in zip(p, points[k]))
+            inside.append(crossing)
+            outside.append(crossing)
+    return inside, outside
+
+
+def area_and_centre(points):
+    """Area and centre of a polygon; one without area has the mean of its corners."""
+    x0, y0 = points[0]
+    moved = [(x - x0, y - y0) for x, y in points]
+    area, mx, my = moments(moved)
+    if not area > 0.0:
+        return 0.0, tuple(sum(c) / len(points) for c in zip(*points))
+    return area, (x0 + mx / area, y0 + my / area)
+
+
+def box(points):
+    """Bounding box: lowest and highest coordinates."""
+    return tuple(map(min, zip(*points))), tuple(map(max, zip(*points)))
+
+
+def in_pixels(points, region):
+    """Yield (x, y, area, centre, points) of the parts of a polygon in the pixels of a region (x0, y0, x1, y1)."""
+    x0, y0, x1, y1 = region
+    (_, low), (_, high) = box(points)
+    for y in range(max(math.floor(low), y0), min(math.ceil(high), y1)):
+        strip = _between(points, 1, y)
+        if not strip:
+            continue
+        (low, _), (high, _) = box(strip)
+        for x in range(max(math.floor(low), x0), min(math.ceil(high), x1)):
+            piece = _between(strip, 0, x)
+            if len(piece) > 2:
+                area, centre = area_and_centre(piece)
+                if area > 0.0:
+                    yield x, y, area, centre, piece
+
+
+def _between(points, axis, low):
+    """The part of a polygon with low <= coordinate <= low + 1."""
+    for level, sign in ((low, 1.0), (low + 1, -1.0)):
+        line = [0.0, 0.0, -sign * level]
+        line[axis] = sign
+        points = clip(points, line)
+        if not points:
+            break
+    return points
