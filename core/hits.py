@@ -79,10 +79,13 @@ class Cells:
     parent : int64
         Index of the cell above, -1 at the root.
     volume : str
-        What the cells really are: "box", or "sphere", "obb", "kdop"; lo and hi are then the boxes of what they hold.
+        What the cells really are: "box", or "sphere", "obb", "kdop", "quad"; lo and hi are then the boxes of what they hold.
     shape : float64, shape (c, p), or None
         Of other volumes than boxes. sphere: centre, radius. obb: three unit axes, low ends along them, high ends. kdop: low
-        ends along the directions of :data:`KDOP_AXES`, then high ends.
+        ends along the directions of :data:`KDOP_AXES`, then high ends. quad: the corners of a parallelogram, those that follow each
+        other share a side except the middle two.
+    covered : bool, or None
+        Of directional techniques: whether one primitive covers the whole cell, a full occluder.
     """
 
     lo: np.ndarray
@@ -94,6 +97,7 @@ class Cells:
     parent: np.ndarray
     volume: str = "box"
     shape: np.ndarray | None = None
+    covered: np.ndarray | None = None
 
     def __len__(self):
         return len(self.lo)
@@ -108,6 +112,16 @@ class Cells:
         return cls(lo, hi, np.asarray(level, np.int32), count, leaf,
                    area / root * np.where(leaf, count, 1), np.asarray(parent, np.int64), volume,
                    None if shape is None else np.asarray(shape, float))
+
+    @classmethod
+    def quads(cls, corners, level, count, leaf, parent, covered):
+        """Flat cells from their corners, shape (c, 4, 3): (low, low), (low, high), (high, low), (high, high)."""
+        corners = np.asarray(corners, float).reshape(-1, 4, 3)
+        sides = corners[:, 2] - corners[:, 0], corners[:, 1] - corners[:, 0]
+        cells = cls.make(corners.min(axis=1), corners.max(axis=1), level, count, leaf, parent, "quad", corners.reshape(-1, 12),
+                         2.0 * np.linalg.norm(np.cross(*sides), axis=1))
+        cells.covered = np.asarray(covered, bool)
+        return cells
 
 
 def box_area(lo, hi):

@@ -12,18 +12,19 @@ from . import overlay_data
 VERTEX = """
 void main()
 {
-  int i = gl_InstanceID * 3;
-  vec4 lo = texelFetch(boxes, ivec2(i % row, i / row), 0);
-  vec4 hi = texelFetch(boxes, ivec2((i + 1) % row, (i + 1) / row), 0);
-  colour = texelFetch(boxes, ivec2((i + 2) % row, (i + 2) / row), 0);
-  gl_Position = projection * vec4(mix(lo.xyz, hi.xyz, pos), 1.0);
+  int i = gl_InstanceID * texels;
+  int corner = int(pos.y * 2.0 + pos.z);
+  vec4 a = texelFetch(boxes, ivec2((texels == 5 ? i + corner : i) % row, i / row), 0);
+  vec4 b = texelFetch(boxes, ivec2((i + 1) % row, i / row), 0);
+  colour = texelFetch(boxes, ivec2((i + texels - 1) % row, i / row), 0);
+  gl_Position = projection * vec4(texels == 5 ? a.xyz : mix(a.xyz, b.xyz, pos), 1.0);
 }
 """
 FRAGMENT = "void main() { result = colour; }"
 
 
 class Boxes:
-    """Cells on the graphics card.
+    """Cells on the graphics card: boxes, or flat cells, each drawn by the edges of a box of which those along x have no length.
 
     Parameters
     ----------
@@ -36,6 +37,7 @@ class Boxes:
     def __init__(self, texels, n):
         self.n = n
         rows, self.row, _ = texels.shape
+        self.texels = self.row // overlay_data.CELLS_PER_ROW
         data = gpu.types.Buffer("FLOAT", texels.size, np.ascontiguousarray(texels, np.float32).ravel())
         self.texture = gpu.types.GPUTexture((self.row, rows), format="RGBA32F", data=data)
 
@@ -50,6 +52,7 @@ class Boxes:
         shader.bind()
         shader.uniform_float("projection", projection)
         shader.uniform_int("row", self.row)
+        shader.uniform_int("texels", self.texels)
         shader.uniform_sampler("boxes", self.texture)
         edges.draw_instanced(shader, instance_start=0, instance_count=self.n)
         gpu.state.depth_test_set("NONE")
@@ -65,6 +68,7 @@ def _shader_and_edges():
         info = gpu.types.GPUShaderCreateInfo()
         info.push_constant("MAT4", "projection")
         info.push_constant("INT", "row")
+        info.push_constant("INT", "texels")
         info.sampler(0, "FLOAT_2D", "boxes")
         info.vertex_in(0, "VEC3", "pos")
         between = gpu.types.GPUStageInterfaceInfo("rayscope_boxes")

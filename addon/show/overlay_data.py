@@ -2,8 +2,12 @@
 
 import numpy as np
 
-#: Cells whose three texels fill one row of the texture.
+#: Cells whose texels fill one row of the texture.
 CELLS_PER_ROW = 1024
+#: Flat cells are drawn so much smaller, so that neighbours can be told apart.
+SMALLER = 0.06
+#: Linear colour of cells that have a full occluder: what no colour of the map looks like.
+COVERED = (1.0, 0.05, 0.01)
 
 #: Sixteen equidistant colours of viridis (van der Walt and Smith 2015, CC0), sRGB: equal steps look equally large.
 VIRIDIS = ("440154", "481a6c", "472f7d", "414487", "39568c", "31688e", "2a788e", "23888e",
@@ -92,20 +96,27 @@ def boxes(cells, levels=None, leaves_only=False, empty=True, by="LEVEL", opacity
 
     Returns
     -------
-    texels : ndarray, shape (rows, 3 * CELLS_PER_ROW, 4), float32
-        Three RGBA texels a cell: lower corner, upper corner, linear colour with opacity. Cells follow each other
-        along a row, so that cell i starts at texel 3 i.
+    texels : ndarray, shape (rows, k * CELLS_PER_ROW, 4), float32
+        RGBA texels, k = 3 a box: lower corner, upper corner, linear colour with opacity; k = 5 a flat cell: its four corners, and
+        the colour. Cells follow each other along a row, so that cell i starts at texel k i.
     n : int
         Cells in it.
     """
     index = select(cells, levels, leaves_only, empty)
-    n = len(index)
-    texels = np.empty((max(1, -(-n // CELLS_PER_ROW)) * CELLS_PER_ROW, 3, 4), np.float32)
+    n, flat = len(index), cells.volume == "quad"
+    k = 5 if flat else 3
+    texels = np.empty((max(1, -(-n // CELLS_PER_ROW)) * CELLS_PER_ROW, k, 4), np.float32)
     texels[n:] = 0.0
     every = n == len(cells)
-    texels[:n, 0, :3] = cells.lo if every else cells.lo[index]
-    texels[:n, 1, :3] = cells.hi if every else cells.hi[index]
-    texels[:n, :2, 3] = 1.0
+    if flat:
+        corners = cells.shape.reshape(-1, 4, 3)[index]
+        texels[:n, :4, :3] = corners + SMALLER * (corners.mean(axis=1, keepdims=True) - corners)
+    else:
+        texels[:n, 0, :3] = cells.lo if every else cells.lo[index]
+        texels[:n, 1, :3] = cells.hi if every else cells.hi[index]
+    texels[:n, :k - 1, 3] = 1.0
     table = np.concatenate([colour_map(), np.full((256, 1), opacity, np.float32)], axis=1)
-    texels[:n, 2] = table[(place(cells, index, by, leaves_only) * 255.0 + 0.5).astype(np.uint8)]
-    return texels.reshape(-1, 3 * CELLS_PER_ROW, 4), n
+    texels[:n, k - 1] = table[(place(cells, index, by, leaves_only) * 255.0 + 0.5).astype(np.uint8)]
+    if cells.covered is not None:
+        texels[:n, k - 1][cells.covered[index]] = *COVERED, opacity
+    return texels.reshape(-1, k * CELLS_PER_ROW, 4), n

@@ -165,3 +165,23 @@ def test_thousands_of_boxes_are_all_drawn():
     drawn = with_gpu(lambda: overlay.picture(np.zeros((400, 400, 4)), texels, n, Matrix.Identity(4)))
     lit = (drawn[..., :3] > 0).any(axis=-1).reshape(side, 10, side, 10).any(axis=(1, 3))
     assert lit.all(), f"{(~lit).sum()} boxes are missing"
+
+def test_flat_cells_are_drawn_as_they_lie_and_full_occluders_stand_out():
+    """Two quads side by side that no axis is along, seen from -z; the second has a full occluder."""
+    first = np.array([(-0.6, -0.3, 0.1), (-0.4, 0.3, 0.2), (-0.1, -0.4, 0.3), (0.1, 0.2, 0.4)])
+    cells = Cells.quads([first, first + (0.6, 0.1, 0.0)], [0, 0], [2, 9], [True, True], [-1, -1], [False, True])
+    np.testing.assert_array_equal(cells.lo[0], (-0.6, -0.4, 0.1))
+    texels, n = overlay_data.boxes(cells, by="COUNT")
+    assert n == 2 and texels.shape == (1, 5 * overlay_data.CELLS_PER_ROW, 4)
+    np.testing.assert_allclose(texels[0, [4, 9], :3], [overlay_data.colour_map()[0], overlay_data.COVERED])
+    drawn = with_gpu(lambda: overlay.picture(np.zeros((200, 200, 4)), texels, n, Matrix.Identity(4)))
+    lit = (drawn[..., :3] > 0).any(axis=-1)
+    red = (drawn[..., 0] > 0.5) & (drawn[..., 1] < 0.2)
+    assert 100 < red.sum() < lit.sum() - 100
+    rows, columns = np.nonzero(red)
+    shrunk = (first + (0.6, 0.1, 0.0)) * (1 - overlay_data.SMALLER) + overlay_data.SMALLER * (first.mean(axis=0) + (0.6, 0.1, 0.0))
+    assert columns.min() == pytest.approx(100 + 100 * shrunk[:, 0].min(), abs=2) and columns.max() == pytest.approx(100 + 100 * shrunk[:, 0].max(), abs=2)
+    assert rows.min() == pytest.approx(100 + 100 * shrunk[:, 1].min(), abs=2) and rows.max() == pytest.approx(100 + 100 * shrunk[:, 1].max(), abs=2)
+    # Its four sides, and no diagonal: the middle stays dark.
+    centre = (100 + 100 * (first.mean(axis=0) + (0.6, 0.1, 0.0))[:2]).astype(int)
+    assert not lit[centre[1] - 5:centre[1] + 5, centre[0] - 5:centre[0] + 5].any()

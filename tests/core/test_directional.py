@@ -366,3 +366,43 @@ def test_cells_said_to_be_covered_are(kind, perspective):
             t = index.closest(o, d).t
             assert np.isfinite(t).all() and (1.0 / t if perspective else -t).min() >= low[k]
     assert found > 30
+
+
+@pytest.mark.parametrize("core", CORES)
+@pytest.mark.parametrize("faces", ["uniform", "adaptive"])
+def test_cells_of_light_buffers_lie_around_lights_and_before_the_scene(core, faces):
+    scene, _ = behind("box")
+    index = build(scene, "light-buffer", core, faces=faces, resolution=8)
+    cells = index.cells()
+    corners = cells.shape.reshape(-1, 4, 3)
+    lamp = np.array(scene.lights[0].position)
+    near = np.abs(corners - lamp).max(axis=(1, 2)) < 0.1 * index.extra
+    assert near.any() and not near.all(), "a cube around the lamp, and the sun's window"
+    # On the cube: one coordinate of each face is its distance.
+    half = np.abs(corners[near] - lamp).max()
+    assert np.isclose(np.abs(corners[near] - lamp).max(axis=2), half).all()
+    along = corners[~near] @ np.array(scene.lights[1].direction)
+    assert np.ptp(along) < 1e-9 and along.max() < (points_of(scene) @ np.array(scene.lights[1].direction)).min()
+    assert (cells.count[cells.leaf] > 0).any() and (cells.lo == corners.min(axis=1)).all() and (cells.hi == corners.max(axis=1)).all()
+    assert cells.covered.any() == (faces == "adaptive") and not cells.covered[~cells.leaf].any()
+    below = np.flatnonzero(cells.parent >= 0)
+    assert (cells.level[below] == cells.level[cells.parent[below]] + 1).all() and (cells.parent[below] < below).all()
+
+
+@pytest.mark.parametrize("core", CORES)
+@pytest.mark.parametrize("kind", ["perspective", "orthographic"])
+def test_cells_of_the_image_directory_lie_on_the_cameras_frame(core, kind):
+    scene, _ = behind("box")
+    window = (-0.9, 1.0, -0.8, 0.9) if kind == "perspective" else (-2.0, 3.0, -2.0, 2.0)
+    scene.camera = Camera(scene.camera.matrix, window=window, kind=kind)
+    index = build(scene, "image-directory", core)
+    cells = index.cells()
+    corners = cells.shape.reshape(-1, 4, 3)
+    o, d = scene.camera.rays(*zip(*((u, v) for u in (0.0, 1.0) for v in (0.0, 1.0))), (1, 1))
+    np.testing.assert_allclose(corners[0], o + d if kind == "perspective" else o, atol=1e-9)
+    assert cells.parent[0] == -1 and cells.covered.any() and (cells.count[cells.covered] >= 1).all()
+    # What a covered cell's list begins with is what rays through it hit, and there is but one there.
+    alone = corners[cells.covered & (cells.count == 1)].mean(axis=1)
+    view = scene.camera.frame()[0]
+    d = alone - view if kind == "perspective" else np.broadcast_to(scene.camera.frame()[3], alone.shape)
+    assert len(alone) > 3 and (np.asarray(index.closest(alone if kind == "orthographic" else np.broadcast_to(view, alone.shape), d).primitive) >= 0).all()

@@ -8,6 +8,7 @@ could still be nearer, or is too near to an edge to be excluded, is tested too: 
 
 import numpy as np
 
+from ...hits import Cells
 from .raster import Grid, spans
 from .second import Handing
 from .view import Footprints, View
@@ -33,6 +34,23 @@ class ImageDirectory(Handing):
             return
         self.feet = Footprints.of(self.view, self.primitives, progress)
         self.figures.update(N_ER=len(self.feet), memory=self.feet.nbytes)
+
+    def cells(self):
+        """The picture plane as the footprints divide it, on the camera's frame, at distance 1 of a perspective camera."""
+        if not self.primitives.n or self.view is None or not len(self.feet):
+            return super().cells()
+        from .quadtree import MAX_DEPTH, Quadtree
+        near = float(self.scene.camera.near)
+
+        def occludes(low, nearest):
+            # Between the near plane and infinity.
+            if self.view.perspective:
+                return (low > 0.0) & ((near <= 0.0) | (nearest < (1.0 - LOSS) / (near or 1.0)))
+            return nearest < -near - LOSS * abs(near)
+
+        tree = Quadtree(self.view, self.primitives, self.feet, MAX_DEPTH, occludes)
+        return Cells.quads(self.view.corners(tree.area, float(self.view.perspective)), tree.level, np.diff(tree.start), tree.child < 0,
+                           tree.parent, tree.covered >= 0)
 
     def traverse(self, rays, query):
         if self.view is None:

@@ -8,6 +8,7 @@ Rays that go to no light, to a light with an extent, or beyond their light are h
 import numpy as np
 
 from ...errors import Notice
+from ...hits import Cells
 from ..structure import Structure
 from .cube import Cube
 from .lists import LOSS, Lists, centre_buffer
@@ -16,6 +17,8 @@ from .view import View
 
 #: How far beside a light a ray may pass, relative to the largest coordinate; well within the footprints' own rounding.
 BESIDE = 2.0**-46
+#: Half the edge of the cubes that are drawn, relative to the scene.
+SHOWN = 0.02
 #: A batch of rays whose light is not told is compared with so many lights.
 LIGHTS_TRIED = 16
 
@@ -86,6 +89,16 @@ class LightBuffer(Handing):
             self._make_room(number)
         return which if not own.any() else which[~own]
 
+    def cells(self):
+        """The buffers of the first lights in place: direction cubes around lights, the sun's window in front of the scene."""
+        if not self.primitives.n:
+            return super().cells()
+        parts = []
+        for number in range(min(len(self.lights), LIGHTS_TRIED)):
+            parts += self.buffer(number).quads(SHOWN * self.extra)
+            self._make_room(number)
+        return joined(parts)
+
     def _make_room(self, number):
         """Give up the buffers not used for longest when all take too much memory."""
         while len(self.buffers) > 1 and sum(b.nbytes for b in self.buffers.values()) > self.max_bytes:
@@ -130,6 +143,10 @@ class _Point:
     @property
     def references(self):
         return sum(len(face.entry) for face in self.cube.faces.values())
+
+    def quads(self, half):
+        """The cells of each face, as of :meth:`Lists.quads`."""
+        return [self.cube.face(k).quads(half) for k in range(6)]
 
     def test(self, rays, query, which):
         """Test those of the rays `which` that go to the light, as far as lists tell; a mask of them."""
@@ -187,6 +204,13 @@ class _Sun:
     def references(self):
         return len(self.lists.entry) if self.lists else 0
 
+    def quads(self, half):
+        """The cells of the window, as of :meth:`Lists.quads`."""
+        if not self.view.usable:
+            return []
+        self.lists = self.lists or self._make()
+        return [self.lists.quads(half)]
+
     def test(self, rays, query, which):
         """Test those of the rays `which` that go to the sun, as far as lists tell; a mask of them."""
         if not self.view.usable:
@@ -210,6 +234,16 @@ class _Sun:
                 end = np.where(stop > -np.inf, -stop - 4.0 * LOSS * (np.abs(stop) + np.abs(z[seen])), np.inf)
             own[seen[self.lists.test(query, which[seen], u[seen], v[seen], nearness, end)]] = False
         return own
+
+
+def joined(parts):
+    """Cells from what several :meth:`Lists.quads` give."""
+    if not parts:
+        return Cells.make([], [], [], [], [], [])
+    first = np.cumsum([0] + [len(part[0]) for part in parts])
+    for part, before in zip(parts, first):
+        part[4] = np.where(part[4] >= 0, part[4] + before, -1)
+    return Cells.quads(*(np.concatenate(column) for column in zip(*parts)))
 
 
 def _some(rays, which):

@@ -141,6 +141,19 @@ class Lists:
         self.start = np.concatenate([[0], np.cumsum(np.bincount(cell.take(kept), minlength=len(u)))])
         self.nbytes = feet.nbytes + self.entry.nbytes + self.start.nbytes + self.covered.nbytes
 
+    def quads(self, z):
+        """The cells in place, at a distance `z`: corners, level, count, leaf, parent, covered, as of :meth:`Cells.quads`."""
+        count = np.diff(self.start)
+        if self.grid is None:
+            return [np.zeros((0, 4, 3))] + [np.zeros(0, int)] * 5
+        if isinstance(self.grid, Quadtree):
+            tree = self.grid
+            return [self.view.corners(tree.area, z), tree.level, count, tree.child < 0, tree.parent, self.covered >= 0]
+        u, v = self.grid.centres()
+        area = np.stack([u - self.grid.half_u, u + self.grid.half_u, v - self.grid.half_v, v + self.grid.half_v], axis=1)
+        none = np.full(len(u), -1)
+        return [self.view.corners(area, z), none + 1, count, none < 0, none, self.covered >= 0]
+
     def test(self, query, ray, u, v, nearness, end=None):
         """Test rays against what is listed where they pass the window.
 

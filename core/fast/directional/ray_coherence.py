@@ -211,17 +211,9 @@ class RayCoherence(Handing):
             return super().cells()
         made = np.flatnonzero(self.lists.count >= 0)
         item, cell = np.divmod(self.lists.keys[made], len(self.cone[1]))
-        along, half = self.resolution, self.radius[item] / np.sqrt(3.0)
-        number, place = np.divmod(cell, along * along)
-        axis, n = number >> 1, np.arange(len(item))
-        lo, hi = np.empty((len(item), 3)), np.empty((len(item), 3))
-        lo[n, axis] = hi[n, axis] = np.where(number & 1, -1.0, 1.0)
-        for k, at in enumerate((place % along, place // along)):
-            side = (axis + 1 + k) % 3
-            lo[n, side], hi[n, side] = 2.0 * at / along - 1.0, 2.0 * (at + 1) / along - 1.0
-        centre = self.centre[:, item].T
-        return Cells.make(centre + half[:, None] * lo, centre + half[:, None] * hi, np.zeros(len(item)), self.lists.count[made],
-                          np.ones(len(item), bool), np.full(len(item), -1))
+        half, none = self.radius[item] / np.sqrt(3.0), np.full(len(item), -1)
+        corners = np.stack([self.centre[:, item] + half * corner(self.resolution, cell, di, dj) for di in (0, 1) for dj in (0, 1)], axis=-1)
+        return Cells.quads(corners.transpose(1, 2, 0), none + 1, self.lists.count[made], none < 0, none, none >= 0)
 
 
 class Store:
@@ -366,15 +358,22 @@ def _spheres(primitives, lights):
     return np.concatenate([centre, places], axis=1), np.concatenate([radius, sizes + own])
 
 
+def corner(resolution, cell, di, dj):
+    """Points (3, n) of cells on the cube from -1 to 1; di and dj go from 0 to 1 across each."""
+    number, place = np.divmod(cell, resolution * resolution)
+    j, i = np.divmod(place, resolution)
+    d, n, axis = np.empty((3, len(cell))), np.arange(len(cell)), number >> 1
+    d[axis, n] = np.where(number & 1, -1.0, 1.0)
+    d[(axis + 1) % 3, n], d[(axis + 2) % 3, n] = 2.0 * (i + di) / resolution - 1.0, 2.0 * (j + dj) / resolution - 1.0
+    return d
+
+
 def cones(resolution):
     """Axes (3, c), cosines and sines (c,) of cones around the cells of a direction cube, a trifle too wide."""
-    number, j, i = (a.ravel() for a in np.indices((6, resolution, resolution)))
+    cell = np.arange(6 * resolution**2)
 
     def direction(di, dj):
-        d = np.empty((3, len(number)))
-        n, axis = np.arange(len(number)), number >> 1
-        d[axis, n] = np.where(number & 1, -1.0, 1.0)
-        d[(axis + 1) % 3, n], d[(axis + 2) % 3, n] = 2.0 * (i + di) / resolution - 1.0, 2.0 * (j + dj) / resolution - 1.0
+        d = corner(resolution, cell, di, dj)
         return d / np.sqrt((d * d).sum(axis=0))
 
     axis = direction(0.5, 0.5)

@@ -57,7 +57,7 @@ class View:
             rows[:2] -= middle[:, None] * rows[2]
         self.shift = np.zeros(2) if perspective else middle / half
         rows[:2] /= half[:, None]
-        self.rows = rows
+        self.rows, self.frame = rows, (np.stack([right, up, forward]).astype(float), half, middle)
         self.scale = float(np.abs(rows).sum(axis=1).max())
         self.extra = max(float(np.abs(self.position).max()), extra)
         self.usable = bool(np.isfinite(rows).all() and np.isfinite(self.shift).all() and np.isfinite(self.extra))
@@ -71,6 +71,17 @@ class View:
             except np.linalg.LinAlgError:
                 return None
         return view if view.usable else None
+
+    def at(self, u, v, z):
+        """World points, shape (n, 3), seen at (u, v); z along `forward`."""
+        axes, half, middle = self.frame
+        x, y, z = np.broadcast_arrays(middle[0] + half[0] * u, middle[1] + half[1] * v, z)
+        away = z if self.perspective else np.ones_like(z)
+        return self.position + (np.stack([x * away, y * away, z], axis=-1) @ axes)
+
+    def corners(self, area, z):
+        """World corners, shape (c, 4, 3), of cells u_lo, u_hi, v_lo, v_hi of the window."""
+        return np.stack([self.at(area[:, i], area[:, j], z) for i in (0, 1) for j in (2, 3)], axis=1)
 
     def directions(self, d):
         """x, y, z of directions, columns."""

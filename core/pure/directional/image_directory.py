@@ -7,9 +7,8 @@ of few large primitives, the ray needs no search at all (compare Weghorst, Hoope
 
 import math
 
-from ...hits import Cells
 from ..structure import memory_of
-from .quadtree import divide
+from .quadtree import divide, quads
 from .second import Handing
 from .view import LOSS, View
 
@@ -40,17 +39,8 @@ class ImageDirectory(Handing):
                             N_ER=sum(len(c.entries) for c in leaves), depth=max(c.level for c in cells), memory=memory_of(self.root))
 
     def cells(self):
-        """The cells on the camera's frame, at distance 1 of a perspective camera; each as the box around its four corners."""
-        if not self.root:
-            return super().cells()
-        camera, cells = self.scene.camera, list(self.root.walk())
-        places = [(0.5 + 0.5 * u, 0.5 + 0.5 * v) for c in cells for u in c.area[:2] for v in c.area[2:]]
-        points = sum(camera.rays(*zip(*places), (1, 1))).tolist()
-        corners = [tuple(zip(*points[k:k + 4])) for k in range(0, len(points), 4)]
-        lo, hi = ([tuple(map(f, corner)) for corner in corners] for f in (min, max))
-        above = {child.number: c.number for c in cells for child in c.children or ()}
-        return Cells.make(lo, hi, [c.level for c in cells], [len(c.entries) for c in cells],
-                          [not c.children for c in cells], [above.get(c.number, -1) for c in cells])
+        """The cells on the camera's frame, at distance 1 of a perspective camera."""
+        return quads([(self.view, self.root)], float(self.view.perspective)) if self.root else super().cells()
 
     def _occludes(self, footprint, low, high):
         """A primitive that covers a cell ends its rays where it lies between the near plane and infinity."""

@@ -11,12 +11,14 @@ from ...errors import Notice
 from ..query import Occluded
 from ..structure import Structure, memory_of
 from .cube import Cube
-from .quadtree import divide, divide_evenly
+from .quadtree import divide, divide_evenly, quads
 from .second import Handing
 from .view import LOSS, View, cross
 
 #: How far beside a light a ray may pass, relative to the largest coordinate; well within the footprints' own rounding.
 BESIDE = 2.0**-46
+#: Half the edge of the cubes that are drawn, relative to the scene.
+SHOWN = 0.02
 #: Levels of an adaptive face, where no resolution is asked for.
 LEVELS = 8
 #: A ray whose light is not told is compared with so many lights.
@@ -59,10 +61,7 @@ class LightBuffer(Handing):
 
     def serve(self, number, query):
         """Answer if the ray goes to a light; whether it does."""
-        buffer = self.buffers.get(number)
-        if buffer is None:
-            light = self.lights[number]
-            buffer = (_Sun if light.kind == "sun" else _Point)(light, self.primitives, self.extra, self.divide)
+        buffer = self.buffers.get(number) or self._new(number)
         place = buffer.place(query.ray)
         if place is None:
             return False
@@ -83,6 +82,22 @@ class LightBuffer(Handing):
                 break
             query.test(item)
         return True
+
+    def cells(self):
+        """The buffers of the first lights in place: direction cubes around lights, the sun's window in front of the scene."""
+        if not self.primitives:
+            return super().cells()
+        windows = []
+        for number in range(min(len(self.lights), LIGHTS_TRIED)):
+            self.buffers[number] = self.buffers.pop(number, None) or self._new(number)
+            windows += self.buffers[number].windows()
+            self._make_room(number)
+        return quads(windows, SHOWN * self.extra)
+
+    def _new(self, number):
+        """A buffer for a light."""
+        light = self.lights[number]
+        return (_Sun if light.kind == "sun" else _Point)(light, self.primitives, self.extra, self.divide)
 
     def _make_room(self, number):
         """Give up the buffers not used for longest when all take too much memory."""
@@ -124,6 +139,10 @@ class _Point:
     @property
     def faces(self):
         return self.cube.faces
+
+    def windows(self):
+        """Views and cells of all faces."""
+        return [self.cube.face(k) for k in range(6)]
 
     @property
     def parts(self):
@@ -170,6 +189,13 @@ class _Sun:
     def parts(self):
         return len(self.faces)
 
+    def windows(self):
+        """View and cells, in a list."""
+        if not self.faces and self.view.usable:
+            footprints = [f for f in (self.view.footprint(i, p) for i, p in enumerate(self.primitives)) if f is not None]
+            self.faces[0] = self.view, self.divide(footprints)
+        return list(self.faces.values())
+
     def place(self, ray):
         """What :meth:`cell` needs of a ray that goes to the sun, else None."""
         forward = self.view.rows[2]
@@ -183,8 +209,6 @@ class _Sun:
     def cell(self, place, ray):
         """The cell that a ray passes through, the least nearness that matters, and the greatest that it reaches."""
         u, v, z, along = place
-        if not self.faces:
-            footprints = [f for f in (self.view.footprint(i, p) for i, p in enumerate(self.primitives)) if f is not None]
-            self.faces[0] = self.view, self.divide(footprints)
+        root = self.windows()[0][1]
         begin, end = z + ray.t_min * along, z + ray.t_max * along
-        return (self.faces[0][1].leaf(u, v), -begin - LOSS * (abs(begin) + abs(z)), -end - LOSS * abs(end) if end > -math.inf else math.inf)
+        return (root.leaf(u, v), -begin - LOSS * (abs(begin) + abs(z)), -end - LOSS * abs(end) if end > -math.inf else math.inf)

@@ -2,6 +2,8 @@
 
 import math
 
+from ...hits import Cells
+
 #: A cell with more primitives is divided, ...
 LEAF_SIZE = 4
 #: ... down to this level, ...
@@ -98,6 +100,22 @@ def divide_evenly(footprints, resolution, z_buffer, occludes=lambda footprint, l
     for cell in root.children:
         cell.entries = _listed(_seen(cell, footprints, _nearest if z_buffer else lambda wide, there: (), occludes))
     return _numbered(root)
+
+
+def quads(windows, z):
+    """Cells to draw: those of some windows, pairs of a view and a root, at a distance `z`."""
+    corners, level, count, leaf, parent, covered = ([] for _ in range(6))
+    for view, root in windows:
+        first, above = len(corners), {}
+        for cell in root.walk():
+            corners.append(view.corners(cell.area, z))
+            level.append(cell.level)
+            count.append(len(cell.entries))
+            leaf.append(not cell.children)
+            parent.append(above.get(id(cell), -1))
+            covered.append(leaf[-1] and cell.covered >= 0)
+            above.update((id(child), first + cell.number) for child in cell.children or ())
+    return Cells.quads(corners, level, count, leaf, parent, covered)
 
 
 def _seen(cell, footprints, propose, occludes):

@@ -152,18 +152,16 @@ class RayCoherence(Handing):
         """The cells that have a list, in place: each on its cube, whose corners lie on the primitive's sphere."""
         if not self.primitives:
             return super().cells()
-        lo, hi, count = [], [], []
+        quads, count = [], []
         for (item, cell), entries in sorted(self.lists.items(), key=lambda pair: pair[0]):
             if entries is None:
                 continue
             centre, radius = self.spheres[item]
-            ends = corners(cell, self.resolution)
             half = radius / math.sqrt(3.0)
-            lo.append(tuple(c + half * min(e) for c, e in zip(centre, zip(*ends))))
-            hi.append(tuple(c + half * max(e) for c, e in zip(centre, zip(*ends))))
+            quads.append([tuple(c + half * x for c, x in zip(centre, p)) for p in corners(cell, self.resolution)])
             count.append(len(entries))
         n = len(count)
-        return Cells.make(lo, hi, [0] * n, count, [True] * n, [-1] * n)
+        return Cells.quads(quads, [0] * n, count, [True] * n, [-1] * n, [False] * n)
 
 
 def tight(both, distance):
@@ -182,7 +180,7 @@ def corners(cell, resolution):
     j, i = divmod(place, resolution)
     axis, back = divmod(face, 2)
     points = []
-    for di, dj in ((0, 0), (1, 0), (0, 1), (1, 1)):
+    for di, dj in ((0, 0), (0, 1), (1, 0), (1, 1)):
         d = [0.0] * 3
         d[axis] = -1.0 if back else 1.0
         d[(axis + 1) % 3], d[(axis + 2) % 3] = 2.0 * (i + di) / resolution - 1.0, 2.0 * (j + dj) / resolution - 1.0

@@ -58,6 +58,7 @@ class View:
         half, middle = ((right_ - left) / 2.0, (top - bottom) / 2.0), ((left + right_) / 2.0, (bottom + top) / 2.0)
         if perspective:
             x, y = (tuple(c - m * f for c, f in zip(row, z)) for row, m in zip((x, y), middle))
+        self.frame = (tuple(right), tuple(up), tuple(forward)), half, middle
         self.shift = (0.0, 0.0) if perspective else tuple(m / h for m, h in zip(middle, half))
         self.rows = (*(tuple(c / h for c in row) for row, h in zip((x, y), half)), z)
         self.scale = max(sum(map(abs, row)) for row in self.rows)
@@ -72,6 +73,13 @@ class View:
         except ZeroDivisionError:
             return None
         return view if view.usable else None
+
+    def corners(self, area, z):
+        """World corners of a cell u_lo, u_hi, v_lo, v_hi of the window; z along `forward`."""
+        (right, up, forward), half, middle = self.frame
+        away = z if self.perspective else 1.0
+        places = [(away * (middle[0] + half[0] * u), away * (middle[1] + half[1] * v)) for u in area[:2] for v in area[2:]]
+        return [tuple(p + x * a + y * b + z * c for p, a, b, c in zip(self.position, right, up, forward)) for x, y in places]
 
     def direction(self, d):
         """x, y, z of a direction."""
