@@ -11,6 +11,8 @@ FIGURES = {
     "N_EE": "empty elementary cells",
     "N_ER": "references to primitives from elementary cells",
     "N_L": "lists of primitives, where cells share them",
+    "N_S": "cells made with the list of a neighbour, or of the cell above",
+    "evicted": "cells given up for want of room",
     "load_factor": "entries of the hash table over its size",
     "collisions": "entries of the hash table that are not the first of their chain",
     "surplus": "references of cells that intersecting lists adds, as a part of those of exact lists",
