@@ -87,6 +87,8 @@ class Material:
         Share of the ray that the surface stops; emission counts with it too.
     texture_alpha : bool
         Multiply `alpha` by the texture's alpha channel: leaves cut out of a rectangle.
+    roughness : float
+        Principled roughness. Rays are reflected as by a mirror; cones are scattered by it.
     """
 
     name: str = "Material"
@@ -108,6 +110,7 @@ class Material:
     emission: tuple = (0.0, 0.0, 0.0)
     alpha: float = 1.0
     texture_alpha: bool = False
+    roughness: float = 0.0
 
     @classmethod
     def principled(cls, name, base=(0.8, 0.8, 0.8), metallic=0.0, roughness=0.5, ior=1.5, alpha=1.0,
@@ -126,7 +129,8 @@ class Material:
                    specular=reflectance * dielectric * lobe, specular_base=metallic * lobe, shininess=shininess,
                    mirror=mirror, mirror_base=metallic * gloss, transmission=dielectric * transmission,
                    transmission_exponent=transmission_exponent,
-                   ior=ior, fresnel=True, reflectance=reflectance, emission=tuple(emission), alpha=alpha, **more)
+                   ior=ior, fresnel=True, reflectance=reflectance, emission=tuple(emission), alpha=alpha,
+                   roughness=roughness, **more)
 
     def reflectance_at_normal(self):
         """F0 of Fresnel's equations."""

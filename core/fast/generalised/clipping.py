@@ -191,8 +191,11 @@ def subtract(corners, count, owner, lines, sliver=SLIVER):
 def joined(choices, which, rows):
     """Rows of several sets of polygons: row rows[i] of set which[i]."""
     width = max(c.shape[1] for c, _ in choices)
-    stack = np.stack([_widened(c, width) for c, _ in choices])
-    return stack[which, rows], np.stack([n for _, n in choices])[which, rows]
+    corners, count = np.empty((len(which), width, choices[0][0].shape[2])), np.empty(len(which), np.int64)
+    for k, (some, number) in enumerate(choices):
+        own = np.flatnonzero(which == k)
+        corners[own], count[own] = _widened(some, width)[rows[own]], number[rows[own]]
+    return corners, count
 
 
 def padded(parts):

@@ -24,6 +24,7 @@ _SCALARS = (
     "alpha",
     "texture_alpha",
     "vertex_colours",
+    "roughness",
 )
 
 
@@ -192,7 +193,7 @@ class Surfaces:
             np.ascontiguousarray(hits.point[which].T),
             hits.error[which],
             normal,
-            self._smooth(normal, obj, primitive, u, v),
+            self.smooth(normal, obj, primitive, u, v),
             outside,
             material,
             base,
@@ -230,7 +231,7 @@ class Surfaces:
                 base[:, which] *= np.where(table.vertex_colours[material[which]] > 0.0, colour[:3], 1.0)
         return base, alpha
 
-    def _smooth(self, normal, obj, primitive, u, v):
+    def smooth(self, normal, obj, primitive, u, v):
         """Interpolated corner normals on the side of the geometric ones; `normal` itself where none are."""
         which, smooth = self._normals.at(obj, primitive, u, v)
         if not len(which):

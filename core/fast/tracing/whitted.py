@@ -224,7 +224,7 @@ class Whitted:
         while stack and n + len(stack[-1]) <= WAVE:
             waves.append(stack.pop())
             n += len(waves[-1])
-        return Wave.joined(waves)
+        return type(waves[0]).joined(waves)
 
     def _closest(self, wave):
         """Nearest hits, counted."""
@@ -392,11 +392,14 @@ class Whitted:
         if self.threshold:
             kept = self._worth(kind, weight, key)
             which, o, weight, key = which[kept], o[:, kept], weight[:, kept], None if key is None else key[kept]
-        ray = met[which]
+        return self._sent(wave, met[which], surface, which, kind, o, direction[:, which], t_max[which], weight, key)
+
+    def _sent(self, wave, ray, surface, which, kind, o, direction, t_max, weight, key):
+        """The wave of what goes on from the surfaces `which`, which the rays `ray` of a wave met."""
         return Wave(
             o,
-            direction[:, which],
-            t_max[which],
+            direction,
+            t_max,
             weight,
             wave.pixel[ray],
             wave.depth[ray] + (kind != TRANSPARENT),

@@ -1,0 +1,136 @@
+"""Cones as columns: elliptic or of rectangular section, with an apex, or without one: parallel beams."""
+
+from functools import cached_property
+
+import numpy as np
+
+from ..tracing.vectors import dot
+
+
+class Cones:
+    """n cones: the points o + w (d + s e + t f), (s, t) in the aperture, t_min <= w <= t_max.
+
+    A parallel one consists of the points o + w d + s e + t f.
+
+    Attributes
+    ----------
+    o, d, e, f : ndarray, shape (3, n)
+    t_min, t_max : ndarray, shape (n,)
+    parallel : ndarray, shape (n,), bool
+    leaving : ndarray, shape (2, n), int64
+        Object and primitive of the surface where it starts, which it does not meet again; -1 for none.
+    inside : ndarray, shape (n,), bool
+        It starts within that primitive, and meets its far side.
+    disc : bool
+        The aperture: the unit disc, or the square from (-1, -1) to (1, 1).
+    """
+
+    COLUMNS = ("o", "d", "e", "f", "t_min", "t_max", "parallel", "leaving", "inside")
+
+    def __init__(self, o, d, e, f, t_min, t_max, parallel, leaving, inside, disc=True):
+        self.o, self.d, self.e, self.f, self.t_min, self.t_max = o, d, e, f, t_min, t_max
+        self.parallel, self.leaving, self.inside, self.disc = parallel, leaving, inside, disc
+
+    def __len__(self):
+        return self.o.shape[1]
+
+    def take(self, index):
+        """Some of the cones."""
+        return Cones(*(getattr(self, name)[..., index] for name in self.COLUMNS), disc=self.disc)
+
+    @classmethod
+    def joined(cls, parts):
+        """One set from several with the same aperture."""
+        columns = (np.concatenate([getattr(p, name) for p in parts], axis=-1) for name in cls.COLUMNS)
+        return cls(*columns, disc=parts[0].disc)
+
+    @cached_property
+    def inverse(self):
+        """Rows, shape (3, 3, n), that take a point less o to x, y, w: it lies at o + x e + y f + w d."""
+        e, f, d = self.e, self.f, self.d
+        rows = np.stack([np.cross(f, d, axis=0), np.cross(d, e, axis=0), np.cross(e, f, axis=0)])
+        with np.errstate(divide="ignore", invalid="ignore"):
+            return rows / dot(e, rows[0])
+
+    def local(self, point, cone):
+        """x, y, w of points, shape (3, m), each seen from one of the cones."""
+        p = point - self.o[:, cone]
+        return np.stack([dot(row[:, cone], p) for row in self.inverse])
+
+    def rays(self, cone, s, t):
+        """Origins and directions, shape (3, m), of the rays through (s, t); w counts along them, too."""
+        shift = s * self.e[:, cone] + t * self.f[:, cone]
+        parallel = self.parallel[cone]
+        return self.o[:, cone] + np.where(parallel, shift, 0.0), self.d[:, cone] + np.where(parallel, 0.0, shift)
+
+    def spread(self):
+        """How far points of the cones are from their axes, along x, y and z, at most: at w = 0, and more for each w."""
+        reach = np.hypot(self.e, self.f) if self.disc else np.abs(self.e) + np.abs(self.f)
+        return np.where(self.parallel, reach, 0.0), np.where(self.parallel, 0.0, reach)
+
+
+def meeting(lo, hi, tree, cones):
+    """Which leaves' boxes cones reach into.
+
+    A cone meets a box only where, at some w, its own box does: two bounds on w for each axis, as for the slabs of a
+    ray, by interval arithmetic. No box that is met is missed.
+
+    Parameters
+    ----------
+    lo, hi : ndarray, shape (3, m)
+        World boxes of the nodes.
+    tree : BinaryTree
+    cones : Cones
+
+    Returns
+    -------
+    cone, item : ndarray
+        Pairs of cones and primitives, by ascending cone, then item.
+    visited : ndarray, shape (n,)
+        Nodes entered by each cone.
+    """
+    n = len(cones)
+    visited = np.zeros(n, np.int64)
+    fixed, growing = cones.spread()
+    with np.errstate(divide="ignore"):
+        # o - fixed + w (d - growing) <= hi, and o + fixed + w (d + growing) >= lo.
+        bounds = [
+            (cones.o[a] - fixed[a], 1.0 / (cones.d[a] - growing[a]), cones.o[a] + fixed[a], 1.0 / (cones.d[a] + growing[a]))
+            for a in range(3)
+        ]
+    cone, node = np.arange(n), np.full(n, tree.root, np.int64)
+    pairs = []
+    while len(cone):
+        near, far = cones.t_min.take(cone), cones.t_max.take(cone)
+        with np.errstate(invalid="ignore"):
+            for a, (first, rising, last, falling) in enumerate(bounds):
+                rate = rising.take(cone)
+                w = (hi[a].take(node) - first.take(cone)) * rate
+                up = ~np.signbit(rate)
+                far = np.fmin(far, np.where(up, w, np.inf))
+                near = np.fmax(near, np.where(up, -np.inf, w))
+                rate = falling.take(cone)
+                w = (lo[a].take(node) - last.take(cone)) * rate
+                up = ~np.signbit(rate)
+                near = np.fmax(near, np.where(up, w, -np.inf))
+                far = np.fmin(far, np.where(up, np.inf, w))
+        some = np.flatnonzero(near <= far)
+        cone, node = cone.take(some), node.take(some)
+        visited += np.bincount(cone, minlength=n)
+        inner = tree.left.take(node) >= 0
+        leaf = np.flatnonzero(~inner)
+        if len(leaf):
+            pairs.append((cone.take(leaf), node.take(leaf)))
+        inner = np.flatnonzero(inner)
+        cone, node = cone.take(inner), node.take(inner)
+        cone = np.concatenate([cone, cone])
+        node = np.concatenate([tree.left.take(node), tree.right.take(node)]).astype(np.int64)
+    if not pairs:
+        return np.zeros(0, np.int64), np.zeros(0, np.int64), visited
+    cone, leaf = (np.concatenate(c) for c in zip(*pairs))
+    count = tree.count.take(leaf)
+    ends = np.cumsum(count)
+    item = tree.order[np.repeat(tree.first.take(leaf) - (ends - count), count) + np.arange(ends[-1])]
+    cone = np.repeat(cone, count)
+    order = np.lexsort((item, cone))
+    return cone[order], item[order], visited

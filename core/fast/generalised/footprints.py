@@ -1,0 +1,54 @@
+"""What cones and pyramids share: a tree of boxes that they walk as a whole, and rays beside them."""
+
+import numpy as np
+
+from ..hierarchies.bvh import BVH
+from .cone import meeting
+from .outlines import Pieces
+
+
+class FootprintTree(BVH):
+    """A bounding volume hierarchy that is asked for all primitives within a cone; rays have it as the bvh.
+
+    Attributes
+    ----------
+    pieces : Pieces
+    """
+
+    #: Kinds of primitives that are tested as a whole.
+    SUPPORTED = ()
+
+    def build(self, progress, **parameters):
+        super().build(progress, builder="ploc", order="shuffled", seed=0, leaf_size=1, walk="depth-first")
+
+    def _pack(self):
+        super()._pack()
+        self.pieces = Pieces(self.primitives, self.SUPPORTED)
+        self._lo, self._hi = (np.ascontiguousarray(edge.T) for edge in self.frame.world(self.tree.boxes))
+
+    def within(self, cones):
+        """What is within cones.
+
+        Returns
+        -------
+        outlines : Outlines
+            The pieces of primitives that cover anything of a cone's section.
+        sampled : ndarray, shape (n,), bool
+            Cones that reach the box of a primitive that cannot be tested against them.
+        n_it, n_ts : ndarray, shape (n,)
+            Primitives tested, nodes entered.
+        """
+        n = len(cones)
+        if not self.primitives.n:
+            none = np.zeros(0, np.int64)
+            outlines = Pieces(self.primitives, self.SUPPORTED).outlines(cones, none, none)
+            return outlines, np.zeros(n, bool), np.zeros(n, np.int64), np.zeros(n, np.int64)
+        cone, item, n_ts = meeting(self._lo, self._hi, self.tree, cones)
+        there = self.pieces.count[item] > 0
+        sampled = np.zeros(n, bool)
+        sampled[cone[~there]] = True
+        there &= ~sampled[cone]
+        cone, item = cone[there], item[there]
+        outlines = self.pieces.outlines(cones, cone, item)
+        covers = np.flatnonzero(outlines.share > 0.0)
+        return outlines.take(covers), sampled, np.bincount(cone, minlength=n), n_ts
