@@ -9,7 +9,10 @@ import rayscope.core.fast.subdivision.grid as fast_grid
 import rayscope.core.pure.subdivision.grid as pure_grid
 from rayscope.core import MemoryEstimateError, ParameterError, Scene, build, solids
 from rayscope.core.figures import PER_RAY
-from rayscope.core.fast.subdivision.lists import Lists, PairSet
+from rayscope.core.fast.rays import Rays
+from rayscope.core.fast.subdivision import leaps
+from rayscope.core.fast.subdivision.lists import Lists, PairSet, Recent
+from rayscope.core.fast.subdivision.sieve import Sieve
 from rayscope.core.scene.scene import Object, Shapes
 
 
@@ -244,11 +247,56 @@ def test_macro_regions_save_steps_and_cost_memory():
     a, b, c = (counts(x, o, d)[0].sum(axis=1) for x in (plain, cube, box))
     assert a[0] == b[0] == c[0]
     assert c[1] < b[1] < 0.5 * a[1]
-    cells = plain.figures["N_E"]
-    assert (
-        cube.figures["memory"] == plain.figures["memory"] + cells
-        and box.figures["memory"] == plain.figures["memory"] + 6 * cells
-    )
+    cells, plain = plain.figures["N_E"], build(scene, "grid", resolution=40, walk="add").figures["memory"]
+    assert cube.figures["memory"] == plain + cells and box.figures["memory"] == plain + 6 * cells
+
+
+@pytest.mark.parametrize("name, more", [("grid", {}), ("macro-grid", {}), ("macro-grid", dict(region="box")), ("grid", dict(lists="shared"))], ids=str)
+@pytest.mark.parametrize("scene", [soup(3000, 0.01), soup(300, 0.2), mixed()], ids=["fine", "coarse", "mixed"])
+def test_leaping_finds_what_walking_finds(scene, name, more, monkeypatch):
+    """Nothing is counted, so empty regions are leapt and pairs are left out; small pools are filled up many times."""
+    o, d = rays(4000)
+    monkeypatch.setattr(leaps, "POOL", 100)
+    index = build(scene, name, density=60.0, **more)
+    walked, leapt = (index.closest(o, d, count=c) for c in (True, False))
+    assert leapt.n_it is None and np.array_equal(walked.t, leapt.t) and np.array_equal(walked.primitive, leapt.primitive)
+    assert np.array_equal(index.occluded(o, d, t_max=0.5), index.occluded(o, d, t_max=0.5, count=True)[0])
+
+
+def test_blocks_are_the_largest_empty_ones():
+    rng = np.random.default_rng(3)
+    filled = rng.random((37, 70, 9)) < 0.002
+    code = leaps.Blocks(filled).code.reshape(filled.shape)
+    assert np.array_equal(code == 0, filled)
+    for cell in np.argwhere(~filled)[::97]:
+        empty = [not filled[tuple(slice(c >> k << k, (c >> k << k) + (1 << k)) for c in cell)].any() for k in range(8)]
+        assert code[tuple(cell)] == min(empty.index(False) if False in empty else 8, leaps.Blocks.LEVELS + 1)
+
+
+def test_sieve_keeps_every_pair_that_hits_and_few_others():
+    scene, (o, d) = soup(2000, 0.05), rays(400)
+    primitives = build(scene, "brute").primitives
+    every = Lists(np.zeros(2000, int), np.arange(2000), 1)
+    batch = Rays.checked(o, d, 0.0, np.inf)[0]
+    sieve = Sieve(primitives, every, 0.0)
+    kept = sieve.pairs(sieve.aim(batch, np.zeros(batch.n)), np.arange(batch.n), np.zeros(batch.n, int))
+    kept = set(zip(*(a.tolist() for a in kept)))
+    ray, item = (a.ravel() for a in np.meshgrid(np.arange(batch.n), np.arange(2000), indexing="ij"))
+    hit = primitives.intersect(batch, ray, item, np.full(batch.n, np.inf))[0]
+    assert len(hit) > 100 and {(int(ray[k]), int(item[k])) for k in hit} <= kept
+    assert len(kept) < 20 * len(hit)
+
+
+def test_recent_forgets_but_never_loses():
+    rng, recent, met = np.random.default_rng(5), Recent(50), set()
+    for _ in range(40):
+        ray, number = rng.integers(0, 50, 500), rng.integers(0, 30, 500)
+        new = recent.add(ray, number)
+        added = [(int(ray[k]), int(number[k])) for k in new]
+        # Each pair is new at least the first time, and at most once in a batch.
+        assert len(set(added)) == len(added)
+        assert set(zip(ray.tolist(), number.tolist())) - met <= set(added)
+        met |= set(added)
 
 
 def test_macro_regions_are_chessboard_distances():

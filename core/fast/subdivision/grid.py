@@ -12,8 +12,10 @@ from ...errors import MemoryEstimateError
 from ...hits import Cells, box_area
 from ...memory import free_memory
 from ..structure import Structure
+from . import leaps
 from .box import EPSILON, through_box
 from .lists import Lists, Visits, ranges
+from .sieve import Sieve
 
 #: Bytes a cell takes while the grid is built, and bytes a reference takes.
 CELL_BYTES, REFERENCE_BYTES = 24, 24
@@ -35,6 +37,9 @@ class Grid(Structure):
         Of the cells; z runs fastest.
     margin : float
         How far primitives outside a cell are still listed in it.
+    sieve : Sieve
+    regions : Blocks or None
+        Empty regions, which rays leap where nothing is counted; only with walk = "exact": the other forms walk cell by cell.
     """
 
     NAME = "grid"
@@ -42,10 +47,14 @@ class Grid(Structure):
     def build(self, progress, walk, rule, density, resolution, mailbox, lists):
         self._lay_out(rule, density, resolution)
         self._list(*self._entries(progress), lists)
+        if walk == "exact":
+            self.regions = leaps.Blocks((self.lists.count > 0).reshape(self.resolution))
+            self.figures["memory"] += self.regions.nbytes
 
     def _list(self, cell, item, lists):
         """Make the cells' lists of pairs, and fill in the figures."""
         self.lists = Lists(cell, item, math.prod(self.resolution.tolist()), lists == "shared")
+        self.sieve, self.regions = Sieve(self.primitives, self.lists, self.margin), None
         self._measure()
 
     def _lay_out(self, rule, density, resolution, flat=None):
@@ -151,27 +160,31 @@ class Grid(Structure):
             N_ER=references,
             depth=1,
             c_SAH=float(area[1] * references / area[0]) if area[0] > 0.0 else 0.0,
-            memory=lists.nbytes,
+            memory=lists.nbytes + self.sieve.nbytes,
         )
         if lists.list_of is not None:
             self.figures["N_L"] = lists.lists
 
-    def visits(self, query):
+    def visits(self, query, rays, t_in):
         """What rays do in cells."""
-        return Visits(self.lists, query, self.primitives.n, self.parameters["mailbox"])
+        return Visits(self.lists, query, self.primitives.n, self.parameters["mailbox"], self.sieve, rays, t_in)
 
     def traverse(self, rays, query):
         """From cell to cell along the rays; see :class:`Walk`."""
-        visits = self.visits(query)
         t_in, t_out, slack = through_box(rays, self.lo, self.hi, query.t)
+        visits = self.visits(query, rays, t_in)
         inside = t_in <= t_out
         # These rays come from so far away that their own rounding errors are as large as cells overlap.
         far = inside & (slack > 0.5 * self.margin)
         if far.any():
             visits.everything(np.flatnonzero(far))
         ray = np.flatnonzero(inside & ~far)
-        if len(ray):
-            with np.errstate(over="ignore", invalid="ignore"):
+        if not len(ray):
+            return
+        with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
+            if self.regions is not None and query.counts is None:
+                leaps.walk(self, self.regions, rays, ray, t_in, t_out, visits, query)
+            else:
                 self.walk(Walk(self, rays, ray, t_in), visits, query)
 
     def walk(self, walk, visits, query):

@@ -97,6 +97,9 @@ class Lists:
 class Visits:
     """The tests of a batch of rays in cells.
 
+    Where nothing is counted, a sieve leaves out pairs that cannot hit, and mailboxes and marks may forget; neither changes
+    a hit.
+
     Parameters
     ----------
     lists : Lists, or None where a subclass finds cells' primitives in another way
@@ -105,29 +108,46 @@ class Visits:
         Primitives in the set.
     mailbox : bool
         Whether no primitive is tested twice with a ray.
+    sieve : Sieve, optional
+    rays, t : optional
+        With a sieve: the rays, and where they enter the structure.
     """
 
-    def __init__(self, lists, query, n, mailbox):
+    def __init__(self, lists, query, n, mailbox, sieve=None, rays=None, t=None):
         self.lists, self.query, self.counts, self.n = lists, query, query.counts, n
-        self.mailbox = PairSet() if mailbox else None
-        self.marks = PairSet() if lists is not None and lists.list_of is not None else None
+        shared = lists is not None and lists.list_of is not None
+        if self.counts:
+            self.mailbox = _Known(n) if mailbox else None
+            self.marks = _Known(len(lists.start)) if shared else None
+            self.sieve = None
+        else:
+            self.mailbox = Recent(query.t.size) if mailbox else None
+            self.marks = Recent(query.t.size) if shared else None
+            self.sieve = sieve
+            if sieve is not None:
+                self.aimed = sieve.aim(rays, np.where(np.isfinite(t), t, 0.0))
 
     def enter(self, ray, cell):
-        """Rays enter cells, at most one each: test what is there, unless it was tested before."""
+        """Rays enter cells: test what is there, unless it was tested before."""
         number, first, count = self.lists.of(cell)
         if self.counts:
             self.counts.steps(ray)
         filled = np.flatnonzero(count)
         if self.marks is not None:
             # A list tested before is not walked again.
-            new = self.marks.add(ray.astype(np.uint64) * np.uint64(len(self.lists.start)) + number.astype(np.uint64))
+            new = self.marks.add(ray, number)
             if self.counts:
                 self.counts.elementary(ray[new], count[new] == 0)
             filled = new[count[new] > 0]
         elif self.counts:
             self.counts.elementary(ray, count == 0)
-        if len(filled):
-            self.test_ranges(ray.take(filled), first.take(filled), count.take(filled))
+        if not len(filled):
+            return
+        ray = ray.take(filled)
+        if self.sieve is not None:
+            self.test(*self.sieve.pairs(self.aimed, ray, number.take(filled)))
+        else:
+            self.test_ranges(ray, first.take(filled), count.take(filled))
 
     def test_ranges(self, ray, first, count):
         """Test rays against ranges of ``lists.items``."""
@@ -137,7 +157,7 @@ class Visits:
     def test(self, ray, item):
         """Test pairs, those already met left out."""
         if self.mailbox is not None:
-            new = self.mailbox.add(ray.astype(np.uint64) * np.uint64(self.n) + item.astype(np.uint64))
+            new = self.mailbox.add(ray, item)
             if len(new) < len(ray):
                 ray, item = ray.take(new), item.take(new)
         if len(ray):
@@ -151,6 +171,40 @@ class Visits:
             for first in range(0, self.n, width):
                 part, item = ray[start : start + some], np.arange(first, min(first + width, self.n))
                 self.query.test(np.repeat(part, len(item)), np.tile(item, len(part)))
+
+
+class _Known:
+    """Pairs of a ray and a number below n that were met; none is forgotten."""
+
+    def __init__(self, n):
+        self.n, self.pairs = np.uint64(n), PairSet()
+
+    def add(self, ray, number):
+        """Remember pairs, all different; which of them are new."""
+        return self.pairs.add(ray.astype(np.uint64) * self.n + number.astype(np.uint64))
+
+
+class Recent:
+    """Mailboxes of rays: each remembers what it was tested with last (Shevtsov, Soupikov and Kapustin 2007).
+
+    A pair may be forgotten, and be tested again; looking one up costs a fraction of what it does in a set of all.
+    """
+
+    #: Numbers a ray remembers.
+    EACH = 8
+
+    def __init__(self, rays):
+        self.number, self.by = np.full(rays * self.EACH, -1, np.int32), np.zeros(rays * self.EACH, np.int32)
+
+    def add(self, ray, number):
+        """Remember pairs; which of them are not remembered yet."""
+        place = ray * self.EACH + (number & self.EACH - 1)
+        new = np.flatnonzero(self.number.take(place) != number)
+        place, number, turn = place.take(new), number.take(new), np.arange(len(new), dtype=np.int32)
+        self.number[place], self.by[place] = number, turn
+        # Of several pairs for one place the last is there; of one and the same pair the last is new.
+        last = self.by.take(place)
+        return new.take(np.flatnonzero((last == turn) | (number.take(last) != number)))
 
 
 class PairSet:

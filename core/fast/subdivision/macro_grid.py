@@ -38,6 +38,7 @@ class MacroGrid(Grid):
             index = self._indices(some)
             self.reach[:, some] = self._cube(sums, index)[None] if region == "cube" else self._box(sums, index)
         self.figures["memory"] += self.reach.nbytes
+        self.regions = Regions(self.reach, self.lists.count)
 
     def _sums(self):
         """Numbers of filled cells below and before each corner of the grid."""
@@ -99,6 +100,25 @@ class MacroGrid(Grid):
                 far = np.flatnonzero(on.take(empty))
                 parts.append(walk.leap_to(ray.take(empty.take(far)), *(a.take(far, axis=-1) for a in index)))
             ray = np.concatenate(parts)
+
+
+class Regions:
+    """The regions as ``leaps.walk`` asks for them."""
+
+    def __init__(self, reach, count):
+        self.reach, self.count, self.cells = reach.ravel(), count, len(count)
+        self.cubes = len(reach) == 1
+
+    def last(self, cell, k, flip):
+        """The last cells along each axis of the regions that rays in cells `k` are in, and which of them are filled."""
+        cell = np.clip(cell, 0, self.cells - 1).astype(np.int64)
+        filled = np.flatnonzero(self.count.take(cell))
+        if self.cubes:
+            reach = self.reach.take(cell)
+            return [a + reach for a in k], filled
+        # Upwards it is the reach above that counts, downwards that below.
+        rows = [cell + np.where(f == 0, (axis + 3) * self.cells, axis * self.cells) for axis, f in enumerate(flip)]
+        return [a + self.reach.take(row) for a, row in zip(k, rows)], filled
 
 
 def _most(fits, least):

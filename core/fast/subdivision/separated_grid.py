@@ -34,6 +34,7 @@ class SeparatedGrid(Grid):
     def build(self, progress, axes, intersect, rule, density, resolution, mailbox):
         self._lay_out(rule, density, resolution, flat=axes == 2)
         p = self.primitives
+        self.regions = None
         self.axes = [a for a in range(3) if axes == 3 or a != int(np.argmin(self.resolution))]
         first, last = self._index(p.lo - self.margin), self._index(p.hi + self.margin)
         extent = last - first + 1
@@ -75,7 +76,7 @@ class SeparatedGrid(Grid):
     def _refuse_too_many(self, size, rule, density):
         """Cells take no memory here."""
 
-    def visits(self, query):
+    def visits(self, query, rays, t_in):
         return _Visits(self, query, self.parameters["mailbox"])
 
     def candidates(self, cell):
