@@ -233,6 +233,15 @@ TECHNIQUES = (
                   Parameter("similarity", 0.9, "Neighbours that have this part of their primitives in common share one list", low=0.0, high=1.0),
                   Parameter("max_bytes", 256e6, "Above it the cells not used for longest are given up", low=1e3, high=1e12, unit="bytes"),
               )),
+    Technique("beams", "Beams", "generalised", "beams", "Beams",
+              "Heckbert and Hanrahan 1984; Atherton, Weiler and Greenberg 1978",
+              "The view pyramid is cut by polygons, reflected and refracted as a whole: exact visible areas. Triangles and polygons; what "
+              "shows others is sampled; rays have the bvh beneath",
+              parameters=(
+                  Parameter("max_fragments", 200_000, "Polygons that beams may be cut into; what is left is traced by sampled rays",
+                            low=1_000, high=100_000_000),
+                  Parameter("levels", 1, "Reflections and refractions of the beams that the overlay draws", low=0, high=16),
+              ), tracer="generalised.beam_tracer.BeamTracer"),
     Technique("embree", "Embree", "peers", "embree", "Embree",
               "Wald et al. 2014", "Intel's ray tracing kernels, through the package embreex",
               primitives="triangle", cores=("fast",)),
