@@ -385,6 +385,8 @@ class Rendering:
         except Cancelled:
             self.result.cancelled = not done
             self._figures(began)
+        # Some is known only now.
+        self.result.notices += [n for n in self._tracer.notices if n not in self.result.notices]
 
     def _sampled(self, order):
         """Take as many samples everywhere; yield how much is done, and the tile."""

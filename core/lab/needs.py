@@ -237,7 +237,12 @@ def calibration(core="fast"):
         scenes = [(_uneven if uneven else _even)(n) for n, uneven in SCENES[core]]
         sets = [ray_sets(scene, build(scene, STANDARD), RAYS[core][0], 0) for scene in scenes]
         looked = [survey(scene) for scene in scenes]
-        own = [row.name for row in techniques() if row.family != "peers" and core in row.cores and set(KINDS) <= set(row.rays)]
+        # What traces more than rays makes other pictures, and its rays are those of another technique.
+        own = [
+            row.name
+            for row in techniques()
+            if row.family not in ("peers", "generalised") and core in row.cores and set(KINDS) <= set(row.rays)
+        ]
         for name in sorted(own, key=lambda name: (name not in FIRST, FIRST.index(name) if name in FIRST else 0)):
             if name in FIRST[:2] or time.process_time() - cpu < BUDGET:
                 technique(name).load(core)                              # importing is not building
@@ -497,7 +502,7 @@ def _left_out(seen, rays, choice, rows, core, primary, depth):
                 / len(used) else "would gain less than the model is sure of", f"{row['T_B']:.2g} s to build, {row['s']:.2g} s in all")
     skipped = [t.name for t in techniques() if t.name not in models and t.family != "peers"]
     if skipped:
-        add(", ".join(skipped), "serve only some kinds of ray, or were not calibrated within the time for it", "not estimated")
+        add(", ".join(skipped), "serve only some kinds of ray, trace other things than rays, or were not calibrated within the time for it", "not estimated")
     add("the passes N_IT and N_TS", "they are counted only with --count", "some time at each test and step")
     return found
 
