@@ -95,6 +95,8 @@ MAX_BYTES = Parameter("max_bytes", 64e6, "With stop = memory: cells are divided 
 WALK = Parameter("walk", "depth-first", "Which of the nodes that wait a ray enters next: the nearest child; the nearest of all, from a heap",
                  choices=("depth-first", "best-first"))
 
+FALLBACK = Parameter("samples", 16, "Rays in place of one that reaches a primitive which cannot be tested as a whole", low=1, high=1024)
+
 OTHER_TESTS = ("moller-trumbore", "badouel", "baldwin-weber", "plucker")
 
 TECHNIQUES = (
@@ -233,6 +235,18 @@ TECHNIQUES = (
                   Parameter("similarity", 0.9, "Neighbours that have this part of their primitives in common share one list", low=0.0, high=1.0),
                   Parameter("max_bytes", 256e6, "Above it the cells not used for longest are given up", low=1e3, high=1e12, unit="bytes"),
               )),
+    Technique("cones", "Cones", "generalised", "cones", "ConeTree",
+              "Amanatides 1984",
+              "One cone a pixel, to each light that has an extent and off each mirror: shares of it are covered. Triangles, polygons, "
+              "spheres; rays have the bvh beneath",
+              parameters=(
+                  FALLBACK,
+                  Parameter("gloss", True, "Cones are scattered by what they are reflected by, as rough as it is; without, as by mirrors"),
+              ), tracer="generalised.cones_tracer.ConeTracer"),
+    Technique("pyramids", "Pyramids", "generalised", "pyramids", "PyramidTree",
+              "Catmull 1978; Weiler and Atherton 1977",
+              "What polygons cover of each pixel is found by exact clipping; all else is traced by rays, which have the bvh beneath",
+              parameters=(FALLBACK,), tracer="generalised.pyramids_tracer.PyramidTracer"),
     Technique("beams", "Beams", "generalised", "beams", "Beams",
               "Heckbert and Hanrahan 1984; Atherton, Weiler and Greenberg 1978",
               "The view pyramid is cut by polygons, reflected and refracted as a whole: exact visible areas. Triangles and polygons; what "

@@ -69,17 +69,45 @@ class Cones:
         return np.where(self.parallel, reach, 0.0), np.where(self.parallel, 0.0, reach)
 
 
-def meeting(lo, hi, tree, cones):
-    """Which leaves' boxes cones reach into.
+class Reach:
+    """Tests of cones against boxes; a box that is met is never missed.
 
     A cone meets a box only where, at some w, its own box does: two bounds on w for each axis, as for the slabs of a
-    ray, by interval arithmetic. No box that is met is missed.
+    ray, by interval arithmetic.
+    """
+
+    def __init__(self, cones):
+        self.cones = cones
+        fixed, growing = cones.spread()
+        with np.errstate(divide="ignore"):
+            # o - fixed + w (d - growing) <= hi, and o + fixed + w (d + growing) >= lo.
+            self.bounds = [
+                (cones.o[a] - fixed[a], 1.0 / (cones.d[a] - growing[a]), cones.o[a] + fixed[a], 1.0 / (cones.d[a] + growing[a]))
+                for a in range(3)
+            ]
+
+    def met(self, cone, lo, hi, box):
+        """Which pairs of cones and boxes meet, as indices; `lo` and `hi` have the shape (3, boxes)."""
+        near, far = self.cones.t_min.take(cone), self.cones.t_max.take(cone)
+        with np.errstate(invalid="ignore"):
+            for a, (first, rising, last, falling) in enumerate(self.bounds):
+                for edge, start, rate, up_ends in ((hi[a], first, rising, True), (lo[a], last, falling, False)):
+                    rate = rate.take(cone)
+                    w = (edge.take(box) - start.take(cone)) * rate
+                    ends = np.signbit(rate) ^ up_ends
+                    far = np.fmin(far, np.where(ends, w, np.inf))
+                    near = np.fmax(near, np.where(ends, -np.inf, w))
+        return np.flatnonzero(near <= far)
+
+
+def meeting(tree, tree_boxes, boxes, cones):
+    """Which primitives' boxes cones reach into.
 
     Parameters
     ----------
-    lo, hi : ndarray, shape (3, m)
-        World boxes of the nodes.
     tree : BinaryTree
+    tree_boxes, boxes : (ndarray, ndarray)
+        World boxes lo, hi, of shape (3, m), of its nodes, and of the primitives.
     cones : Cones
 
     Returns
@@ -89,48 +117,27 @@ def meeting(lo, hi, tree, cones):
     visited : ndarray, shape (n,)
         Nodes entered by each cone.
     """
-    n = len(cones)
+    n, reach = len(cones), Reach(cones)
     visited = np.zeros(n, np.int64)
-    fixed, growing = cones.spread()
-    with np.errstate(divide="ignore"):
-        # o - fixed + w (d - growing) <= hi, and o + fixed + w (d + growing) >= lo.
-        bounds = [
-            (cones.o[a] - fixed[a], 1.0 / (cones.d[a] - growing[a]), cones.o[a] + fixed[a], 1.0 / (cones.d[a] + growing[a]))
-            for a in range(3)
-        ]
     cone, node = np.arange(n), np.full(n, tree.root, np.int64)
-    pairs = []
+    pairs = [(cone[:0], node[:0])]
     while len(cone):
-        near, far = cones.t_min.take(cone), cones.t_max.take(cone)
-        with np.errstate(invalid="ignore"):
-            for a, (first, rising, last, falling) in enumerate(bounds):
-                rate = rising.take(cone)
-                w = (hi[a].take(node) - first.take(cone)) * rate
-                up = ~np.signbit(rate)
-                far = np.fmin(far, np.where(up, w, np.inf))
-                near = np.fmax(near, np.where(up, -np.inf, w))
-                rate = falling.take(cone)
-                w = (lo[a].take(node) - last.take(cone)) * rate
-                up = ~np.signbit(rate)
-                near = np.fmax(near, np.where(up, w, -np.inf))
-                far = np.fmin(far, np.where(up, np.inf, w))
-        some = np.flatnonzero(near <= far)
+        some = reach.met(cone, *tree_boxes, node)
         cone, node = cone.take(some), node.take(some)
         visited += np.bincount(cone, minlength=n)
         inner = tree.left.take(node) >= 0
         leaf = np.flatnonzero(~inner)
-        if len(leaf):
-            pairs.append((cone.take(leaf), node.take(leaf)))
+        pairs.append((cone.take(leaf), node.take(leaf)))
         inner = np.flatnonzero(inner)
         cone, node = cone.take(inner), node.take(inner)
         cone = np.concatenate([cone, cone])
         node = np.concatenate([tree.left.take(node), tree.right.take(node)]).astype(np.int64)
-    if not pairs:
-        return np.zeros(0, np.int64), np.zeros(0, np.int64), visited
     cone, leaf = (np.concatenate(c) for c in zip(*pairs))
-    count = tree.count.take(leaf)
+    count = tree.count.take(leaf).astype(np.int64)
     ends = np.cumsum(count)
-    item = tree.order[np.repeat(tree.first.take(leaf) - (ends - count), count) + np.arange(ends[-1])]
+    item = tree.order[np.repeat(tree.first.take(leaf) - (ends - count), count) + np.arange(count.sum())]
     cone = np.repeat(cone, count)
+    some = reach.met(cone, *boxes, item)
+    cone, item = cone[some], item[some]
     order = np.lexsort((item, cone))
     return cone[order], item[order], visited

@@ -7,3 +7,4 @@ class ConeTree(FootprintTree):
     """A tree that is asked for all primitives within a cone."""
 
     SUPPORTED = ("triangle", "polygon", "sphere")
+    NAME = "cones"

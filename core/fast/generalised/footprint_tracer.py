@@ -6,7 +6,6 @@ its share; what is left sees the surroundings.
 
 import numpy as np
 
-from ...errors import Notice
 from ...hits import Hits
 from ..rays import Rays
 from ..tracing import sampling
@@ -69,8 +68,8 @@ class FootprintTracer(Whitted):
 
     def __init__(self, scene, structures, *arguments, **more):
         super().__init__(scene, structures, *arguments, **more)
-        self.notices = unsupported(structures["primary"])
         self.rays_each = structures["primary"].parameters["samples"]
+        self.notices = structures["primary"].notices
 
     def sampled(self, pixels, sample):
         """See :class:`Whitted`."""
@@ -209,18 +208,3 @@ def _misses(n):
         "primitive": np.full(n, -1, np.int64), "part": np.zeros(n, np.int32), "normal": np.zeros((n, 3)),
         "point": np.zeros((n, 3)), "error": np.zeros(n),
     }
-
-
-def unsupported(structure):
-    """Notices that name what cannot be tested as a whole."""
-    pieces = getattr(structure, "pieces", None)
-    if pieces is None or not pieces.kinds:
-        return []
-    name, n = structure.technique.name, structure.parameters["samples"]
-    return [
-        Notice(
-            structure.scene.name,
-            f"{name} cannot be tested against these kinds of primitives: {', '.join(dict.fromkeys(pieces.kinds))}; where "
-            f"they may be seen, {n} rays a pixel are traced instead.",
-        )
-    ]

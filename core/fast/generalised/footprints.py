@@ -4,6 +4,7 @@ import numpy as np
 
 from ..hierarchies.bvh import BVH
 from .cone import meeting
+from ...scene.footprints import unsupported
 from .outlines import Pieces
 
 
@@ -15,16 +16,20 @@ class FootprintTree(BVH):
     pieces : Pieces
     """
 
-    #: Kinds of primitives that are tested as a whole.
-    SUPPORTED = ()
+    #: Kinds of primitives that are tested as a whole, and by what.
+    SUPPORTED, NAME = (), ""
 
-    def build(self, progress, **parameters):
+    def build(self, progress, samples, **parameters):
         super().build(progress, builder="ploc", order="shuffled", seed=0, leaf_size=1, walk="depth-first")
+        self.notices += unsupported(self.pieces.kinds, self.NAME, samples)
 
     def _pack(self):
         super()._pack()
         self.pieces = Pieces(self.primitives, self.SUPPORTED)
-        self._lo, self._hi = (np.ascontiguousarray(edge.T) for edge in self.frame.world(self.tree.boxes))
+        self._tree_boxes, self._boxes = (
+            [np.ascontiguousarray(edge.T) for edge in boxes]
+            for boxes in (self.frame.world(self.tree.boxes), (self.primitives.lo, self.primitives.hi))
+        )
 
     def within(self, cones):
         """What is within cones.
@@ -43,7 +48,7 @@ class FootprintTree(BVH):
             none = np.zeros(0, np.int64)
             outlines = Pieces(self.primitives, self.SUPPORTED).outlines(cones, none, none)
             return outlines, np.zeros(n, bool), np.zeros(n, np.int64), np.zeros(n, np.int64)
-        cone, item, n_ts = meeting(self._lo, self._hi, self.tree, cones)
+        cone, item, n_ts = meeting(self.tree, self._tree_boxes, self._boxes, cones)
         there = self.pieces.count[item] > 0
         sampled = np.zeros(n, bool)
         sampled[cone[~there]] = True

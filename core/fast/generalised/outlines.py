@@ -10,7 +10,7 @@ from functools import cached_property
 
 import numpy as np
 
-from ...scene.ear_clipping import triangulated
+from ...scene.footprints import triangulated
 from ..tracing.vectors import dot
 from . import clipping
 
@@ -71,7 +71,7 @@ class Pieces:
                 continue
             own, self.count[some] = _triangles(kind)
             if not self.count[some].all():
-                self.kinds.append(f"{kind.KIND} that crosses itself")
+                self.kinds.append(kind.KIND)
             corners.append(own)
             number.append(n_triangles + np.arange(own.shape[2]))
             n_triangles += own.shape[2]

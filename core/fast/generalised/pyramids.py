@@ -7,3 +7,4 @@ class PyramidTree(FootprintTree):
     """A tree that is asked for all primitives within a pyramid."""
 
     SUPPORTED = ("triangle", "polygon")
+    NAME = "pyramids"

@@ -57,7 +57,7 @@ class Surfaces:
         outside = dot(d, hit.normal) <= 0.0
         normal = hit.normal if outside else times(-1.0, hit.normal)
         base, alpha = self._colour(material, obj.geometry, hit)
-        shading = self._smooth(normal, hit, obj)
+        shading = self.smooth(normal, hit)
         return Surface(hit.point, hit.error, normal, shading, outside, material, base, alpha, (hit.object, hit.primitive))
 
     def _material(self, obj, hit):
@@ -92,8 +92,9 @@ class Surfaces:
                 base = mul(base, colour)
         return base, alpha
 
-    def _smooth(self, normal, hit, obj):
+    def smooth(self, normal, hit):
         """The interpolated corner normal on the side of the geometric one; `normal` itself where there is none."""
+        obj = self.objects[hit.object]
         n = _interpolated(obj.geometry, "corner_normals", hit)
         if n is None:
             return normal

@@ -312,7 +312,11 @@ class Whitted:
         if self.threshold:
             weight = self._worth(kind, weight, key)
         if weight:
-            yield Path(o, direction, 0.0, t_max, weight, path.depth + (kind != TRANSPARENT), kind, key, surface.place)
+            yield self._sent(path, surface, kind, o, direction, t_max, weight, key)
+
+    def _sent(self, path, surface, kind, o, direction, t_max, weight, key):
+        """What goes on from a surface, which a path met."""
+        return Path(o, direction, 0.0, t_max, weight, path.depth + (kind != TRANSPARENT), kind, key, surface.place)
 
     def _worth(self, kind, weight, key):
         """The weight with which a ray is traced, or None if it is not."""

@@ -1,11 +1,13 @@
-"""Triangles that make up a polygon: ears are cut off one after the other (Meisters 1975)."""
+"""What cones and pyramids of both cores need of a scene: polygons as triangles, and what to say of all else."""
+
+from ..errors import Notice
 
 #: The triangles' areas add up to the polygon's but for so much of it, or the polygon crosses itself.
 TOLERANCE = 1e-9
 
 
 def triangulated(points, normal):
-    """Triangles that make up a planar polygon, convex or not, with holes by bridges.
+    """Triangles that make up a planar polygon, convex or not, with holes by bridges: ears are cut off (Meisters 1975).
 
     Parameters
     ----------
@@ -60,3 +62,30 @@ def _is_ear(flat, left, k):
         if s not in (p, q, r) and min(_cross(p, q, s), _cross(q, r, s), _cross(r, p, s)) >= 0.0:
             return False
     return True
+
+
+def unsupported(kinds, name, samples):
+    """What to say of primitives that cannot be tested as a whole.
+
+    Parameters
+    ----------
+    kinds : list of str
+        Their kinds, one entry a primitive or a kind.
+    name : str
+        What they would be tested against.
+    samples : int
+        Rays in place of one of these.
+
+    Returns
+    -------
+    list of Notice
+        Empty where there are none.
+    """
+    if not kinds:
+        return []
+    return [
+        Notice(
+            ", ".join(sorted(set(kinds))),
+            f"such primitives cannot be tested against {name}; where they may be seen, {samples} rays are traced in place of each.",
+        )
+    ]

@@ -1,0 +1,10 @@
+"""Cones instead of rays (Amanatides 1984)."""
+
+from .footprints import FootprintTree
+
+
+class ConeTree(FootprintTree):
+    """A tree that is asked for all primitives within a cone."""
+
+    SUPPORTED = ("triangle", "polygon", "sphere")
+    NAME = "cones"
