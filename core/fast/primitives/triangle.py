@@ -226,13 +226,18 @@ class Triangles:
         """Boxes of the parts of triangles inside boxes (Sutherland and Hodgman 1974), all pairs at once."""
         m = len(item)
         polygon = np.zeros((9, 3, m))
-        polygon[:3] = self.xyz[:, item].reshape(3, 3, m)
+        corners = polygon[:3] = self.xyz[:, item].reshape(3, 3, m)
         count = np.full(m, 3)
         slack = 8 * 2.0**-53 * np.maximum(np.abs(lo), np.abs(hi)).max(axis=1, initial=0.0)
         slack = np.maximum(slack, 8 * 2.0**-53 * np.abs(polygon[:3]).max(axis=(0, 1), initial=0.0))
         for axis in range(3):
             for sign, limit in ((1.0, lo[:, axis] - slack), (-1.0, -hi[:, axis] - slack)):
-                polygon, count = _clip_plane(polygon, count, axis, sign, limit)
+                # Few planes cut a triangle; what is left of it is nowhere beyond its corners.
+                cut = np.flatnonzero((sign * corners[:, axis] < limit).any(axis=0))
+                if len(cut):
+                    polygon[:, :, cut], count[cut] = _clip_plane(
+                        polygon[:, :, cut], count[cut], axis, sign, limit[cut]
+                    )
         used = (np.arange(9)[:, None] < count)[:, None, :]
         own_lo = np.where(used, polygon, np.inf).min(axis=0).T - slack[:, None]
         own_hi = np.where(used, polygon, -np.inf).max(axis=0).T + slack[:, None]

@@ -45,7 +45,7 @@ class BspTree(CellTree):
         if self.figures["N_ER"] > 8 * n:
             self.notices.append(bsp_notice(self.figures["N_ER"], n))
 
-    def divide(self, cells, worth):
+    def divide_cells(self, cells, worth):
         """Divide cells; see ``growth.grow``."""
         m, cell, n = len(cells.count), cells.cell, cells.count
         tolerance = TOLERANCE * self.margin

@@ -10,8 +10,10 @@ import numpy as np
 
 from ...cells import REFERENCES_AT_LEAST, REFERENCES_PER_PRIMITIVE, limit_notice
 from ...hits import box_area
-from .lists import ranges
+from .lists import chunks, ranges
 
+#: References divided together: columns that stay in the cache, and progress that is told often.
+REFERENCES = 32_768
 #: Cells divided together where they are taken from a queue one by one.
 BATCH = 256
 
@@ -49,12 +51,12 @@ class Cells:
         first = np.cumsum(self.count) - self.count
         refs = ranges(first[index], self.count[index])
         return Cells(
-            self.lo[index],
-            self.hi[index],
-            self.count[index],
-            self.item[refs],
-            tuple(a[refs] for a in self.more),
-            self.level[index],
+            self.lo.take(index, axis=0),
+            self.hi.take(index, axis=0),
+            self.count.take(index),
+            self.item.take(refs),
+            tuple(a.take(refs, axis=0) for a in self.more),
+            self.level.take(index),
         )
 
     @property
@@ -149,48 +151,54 @@ class _Growth:
         self.tree, self.divided, self.leaves = Tree(), [], []
 
     def by_level(self, root, by_cost):
-        """All cells of a level together."""
+        """Level by level, many cells together."""
         cells, number, level = root, self.tree.add(root, 0, -1), 0
         bad = np.zeros(1, np.int64)
         settled = 0
         while len(number):
             wanted = np.flatnonzero(cells.count > self.leaf_size) if level < self.max_depth else np.zeros(0, np.int64)
-            some = cells.take(wanted)
-            before = bad[wanted]
+            references, leaf, parts = settled + int(cells.count.sum()), np.ones(len(number), bool), []
+            for part in chunks(cells.count[wanted], REFERENCES):
+                own = wanted[part]
+                some, before = cells.take(own), bad[own]
 
-            def worth(cost, some=some, before=before):
-                missed = cost >= some.count
-                return (before + missed <= BAD_AT_MOST) & ~((cost > 4.0 * some.count) & (some.count < 16))
+                def worth(cost, some=some, before=before):
+                    missed = cost >= some.count
+                    return (before + missed <= BAD_AT_MOST) & ~((cost > 4.0 * some.count) & (some.count < 16))
 
-            plane, children, cost = self.divide(some, worth if by_cost else None)
-            children.level[:] = level + 1
-            good = np.isfinite(plane).any(axis=0)
-            if by_cost:
-                good &= worth(cost)
-            misses = before + (cost >= some.count)
-            good = self._guarded(good, settled + cells.count.sum(), some, children, level)
-            kept = np.flatnonzero(good)
-            leaf = np.ones(len(number), bool)
-            leaf[wanted[kept]] = False
+                plane, children, cost = self.divide(some, worth if by_cost else None)
+                children.level[:] = level + 1
+                good = np.isfinite(plane).any(axis=0)
+                if by_cost:
+                    good &= worth(cost)
+                good, references = self._guarded(good, references, some, children, level)
+                kept = np.flatnonzero(good)
+                leaf[own[kept]] = False
+                children = children.take((kept[:, None] * self.arity + np.arange(self.arity)).ravel())
+                parent = number[own[kept]]
+                below = self.tree.add(children, level + 1, np.repeat(parent, self.arity))
+                self.divided.append((parent, below[:: self.arity], plane[:, kept]))
+                misses = before + (cost >= some.count)
+                parts.append((children, below, np.repeat(misses[kept], self.arity)))
+                self.progress((level + part.stop / len(wanted)) / (self.max_depth + 1))
             leaf = np.flatnonzero(leaf)
             self._leaves(number[leaf], cells.take(leaf))
             settled += int(cells.count[leaf].sum())
-            children = children.take((kept[:, None] * self.arity + np.arange(self.arity)).ravel())
-            parent = number[wanted[kept]]
-            number = self.tree.add(children, level + 1, np.repeat(parent, self.arity))
-            self.divided.append((parent, number[:: self.arity], plane[:, kept]))
-            cells, bad, level = children, np.repeat(misses[kept], self.arity), level + 1
-            self.progress(level / (self.max_depth + 1))
+            if not parts:
+                break
+            cells = joined([c for c, _, _ in parts])
+            number, bad = (np.concatenate(c) for c in list(zip(*parts))[1:])
+            level += 1
 
     def _guarded(self, good, references, some, children, level):
-        """Divide no more cells once there are too many references."""
+        """Divide no more cells once there are too many references; which are divided, and references then."""
         growth = np.where(good, children.count.reshape(-1, self.arity).sum(axis=1) - some.count, 0)
         over = np.flatnonzero(good & (references + np.cumsum(growth) - growth > self.limit))
         if len(over):
             good = good.copy()
             good[over] = False
             self._notice(some.lo[over[0]], some.hi[over[0]], level, int(some.count[over[0]]))
-        return good
+        return good, references + int(growth.sum())
 
     def _notice(self, lo, hi, level, count):
         if not self.notices:
@@ -269,6 +277,8 @@ BAD_AT_MOST = 1
 
 def joined(some):
     """Several Cells as one."""
+    if len(some) == 1:
+        return some[0]
     more = tuple(np.concatenate(c) for c in zip(*(s.more for s in some))) if some[0].more else ()
     return Cells(
         *(np.concatenate([getattr(s, name) for s in some]) for name in ("lo", "hi", "count", "item")),

@@ -34,7 +34,7 @@ class KdTree(CellTree):
         self.axis = (finite[1] + 2 * finite[2]).astype(np.int64)
         self.figures["memory"] += self.axis.nbytes
 
-    def divide(self, cells, worth):
+    def divide_cells(self, cells, worth):
         """Divide cells; see ``growth.grow``."""
         m = len(cells.count)
         axis, at, cost = self._middle(cells) if self.split == "middle" else self._cheapest(cells, cells.cell)
@@ -103,70 +103,79 @@ class KdTree(CellTree):
     def _cheapest(self, cells, cell):
         """Axis, position and cost of the cheapest plane of each cell.
 
-        The ends of all boxes are sorted, those of a cell together, by their positions as whole numbers; ends of boxes
-        come before beginnings at the same place. So, before a beginning, and after an end, the numbers of boxes on
-        either side are known by counting.
+        The ends of all boxes inside their cells are sorted, those of a cell together, by their positions as whole numbers;
+        ends of boxes come before beginnings at the same place. So, before a beginning, and after an end, the numbers of
+        boxes on either side are known by counting.
         """
-        m, count = len(cells.count), cells.count
-        first = 2 * (np.cumsum(count) - count)
-        own_lo, own_hi = cells.more
+        m, count, n = len(cells.count), cells.count, len(cell)
         size = cells.hi - cells.lo
-        best, axis, at = np.full(m, np.inf), np.zeros(m, np.int64), np.full(m, np.nan)
-        filled = np.flatnonzero(count)
-        events = 2 * count
-        high, step = cell << (POSITION_BITS + 2), np.arange(1, 2 * len(cell) + 1)
-        ends_before = np.repeat(count + first // 2, events)
-        begins_before = np.repeat(first // 2, events)
+        best, axis, chosen = np.full(m, np.inf), np.zeros(m, np.int64), np.full(m, -1)
+        high = cell << POSITION_BITS + 2
+        positions = np.empty((2, 3, n), np.int64)
         for a in range(3):
             scale, offset = np.repeat(POSITIONS / size[:, a], count), np.repeat(cells.lo[:, a], count)
-            begins = np.floor((own_lo[:, a] - offset) * scale).astype(np.int64)
-            ends = np.ceil((own_hi[:, a] - offset) * scale).astype(np.int64)
-            key = np.concatenate([high | begins << 1 | 1, high | ends << 1]).view(np.uint64)
+            begins = np.floor((cells.more[0][:, a] - offset) * scale, out=positions[1, a], casting="unsafe")
+            ends = np.ceil((cells.more[1][:, a] - offset) * scale, out=positions[0, a], casting="unsafe")
+            inner_begins = np.flatnonzero(begins > 0)
+            inner_ends = np.flatnonzero(ends < POSITIONS)
+            key = np.concatenate(
+                [
+                    high.take(inner_begins) | begins.take(inner_begins) << 1 | 1,
+                    high.take(inner_ends) | ends.take(inner_ends) << 1,
+                ]
+            ).view(np.uint64)
             key.sort()
             key = key.view(np.int64)
+            inner = np.bincount(cell.take(inner_begins), minlength=m)
+            events = inner + np.bincount(cell.take(inner_ends), minlength=m)
+            first = np.cumsum(events) - events
             begin = key & 1
-            position = key >> 1 & (2 * POSITIONS - 1)
-            begun = np.cumsum(begin)
-            # Every cell has as many beginnings as ends.
-            left = (begun - begin - begins_before).astype(float)
-            right = (begun - step + ends_before).astype(float)
+            # Boxes to the left less, and plus, those to the right.
+            step = np.arange(1, len(key) + 1)
+            difference = step - begin
+            difference -= np.repeat(inner + first, events)
+            both = np.cumsum(begin)
+            both *= 2
+            both -= step
+            both -= begin
+            both += np.repeat(2 * count - inner - 2 * (np.cumsum(inner) - inner) + first, events)
+            empty = np.flatnonzero(np.abs(difference) == both)
             b, c = size[:, (a + 1) % 3], size[:, (a + 2) % 3]
             face, rim = b * c, (b + c) * size[:, a]
-            cost = position * (1.0 / POSITIONS)
-            cost *= left - right
-            cost += right
-            cost *= np.repeat(rim / (face + rim), events)
-            cost += (left + right) * np.repeat(face / (face + rim), events)
-            empty = np.flatnonzero((left == 0.0) | (right == 0.0))
+            face, rim = face / (face + rim), rim / (face + rim)
+            cost = (key >> 1 & (2 * POSITIONS - 1)) * (1.0 / POSITIONS)
+            cost -= 0.5
+            cost *= difference
+            cost *= np.repeat(rim, events)
+            cost += both * np.repeat(face + 0.5 * rim, events)
             cost[empty] *= 1.0 - self.empty_bonus
-            cost[(position <= 0) | (position >= POSITIONS)] = np.inf
             least = np.full(m, np.inf)
-            least[filled] = np.minimum.reduceat(cost, first[filled])
+            some = np.flatnonzero(events)
+            if not len(some):
+                continue
+            least[some] = np.minimum.reduceat(cost, first[some])
             # The first event of each cell that is that cheap.
             cheapest = np.flatnonzero(cost == np.repeat(least, events))[::-1]
             event = np.zeros(m, np.int64)
             event[key.take(cheapest) >> (POSITION_BITS + 2)] = cheapest
             better = np.flatnonzero(least < best)
-            if not len(better):
-                continue
-            event = event.take(better)
-            exact = self._exact(
-                position.take(event), begin.take(event), better, m, cell, begins, ends, own_lo[:, a], own_hi[:, a]
-            )
-            best[better], axis[better], at[better] = least[better], a, exact
-        return axis, at, 1.0 + best
+            best[better], axis[better] = least[better], a
+            chosen[better] = key.take(event.take(better)) & (4 * POSITIONS - 1)
+        return axis, self._exact(cells, cell, axis, chosen, positions), 1.0 + best
 
     @staticmethod
-    def _exact(position, begin, better, m, cell, begins, ends, own_lo, own_hi):
+    def _exact(cells, cell, axis, chosen, positions):
         """The positions of events, before they were made whole numbers: of beginnings the first, of ends the last."""
-        wanted = np.full((2, m), -1)
-        wanted[begin, better] = position
-        at = np.full((2, m), [[-np.inf], [np.inf]])
-        some = np.flatnonzero(begins == wanted[1].take(cell))
-        np.minimum.at(at[1], cell.take(some), own_lo.take(some))
-        some = np.flatnonzero(ends == wanted[0].take(cell))
-        np.maximum.at(at[0], cell.take(some), own_hi.take(some))
-        return at[begin, better]
+        n, begin = len(cell), np.where(chosen < 0, 2, chosen & 1)
+        place = axis.take(cell) * n + np.arange(n)
+        wanted, kind = (chosen >> 1).take(cell), begin.take(cell)
+        at = np.full(len(axis), np.nan)
+        for which, reduce, start in ((1, np.minimum, np.inf), (0, np.maximum, -np.inf)):
+            some = np.flatnonzero((kind == which) & (positions[which].ravel().take(place) == wanted))
+            own = cell.take(some)
+            at[begin == which] = start
+            reduce.at(at, own, cells.more[1 - which].ravel().take(3 * some + axis.take(own)))
+        return at
 
 
 POSITION_BITS = int(math.log2(POSITIONS))

@@ -46,7 +46,7 @@ class Octree(CellTree):
         _, lo, hi, level, parent, leaf = self.storage.nodes()
         return self.boxes(lo, hi, level, parent, leaf >= 0, np.where(leaf >= 0, self.lists.count[leaf], 0))
 
-    def divide(self, cells, worth):
+    def divide_cells(self, cells, worth):
         """Divide cells; see ``growth.grow``."""
         p, margin, m = self.primitives, self.margin, len(cells.count)
         cell, item = cells.cell, cells.item

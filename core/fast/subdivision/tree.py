@@ -20,7 +20,7 @@ RAYS = 16_384
 
 
 class CellTree(Structure):
-    """Base of octree and kd-tree: a subclass offers `ARITY` and ``divide``.
+    """Base of octree and kd-tree: a subclass offers `ARITY` and ``divide_cells``.
 
     Attributes
     ----------
@@ -52,7 +52,7 @@ class CellTree(Structure):
         """Grow the tree and measure it."""
         more = self.MORE_BYTES + 24 * (walk == "links")
         self.tree = t = growth.grow(
-            self.divide,
+            self.divide_cells,
             root,
             self.ARITY,
             self.primitives.n,

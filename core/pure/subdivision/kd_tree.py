@@ -93,7 +93,8 @@ class KdTree(CellTree):
             for position, what, _ in events:
                 right -= what == END
                 if 0 < position < POSITIONS:
-                    cost = (position / POSITIONS * (left - right) + right) * rim + (left + right) * face
+                    # The parts of the area, each weighted with its boxes.
+                    cost = (position / POSITIONS - 0.5) * (left - right) * rim + (left + right) * (face + 0.5 * rim)
                     if left == 0 or right == 0:
                         cost *= 1.0 - self.empty_bonus
                     if cost < best:
