@@ -14,7 +14,7 @@ from rayscope.core import Camera, Light, Mesh, Object, Scene, SceneError, render
 from rayscope.core import command
 from rayscope.core.command import DONE, FAILED, VERBS, WRONG_CALL, main
 from rayscope.core.fast.hierarchies.bvh import BVH
-from rayscope.core.lab import bench
+from rayscope.core.lab import against_brute, bench
 
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -153,7 +153,19 @@ def test_bench(run):
     for peer in {"mathutils", "embree"} & rows.keys():
         assert rows["grid"][f"x_{peer}_primary"] == pytest.approx(rows[peer]["us_primary"] / rows["grid"]["us_primary"])
     assert 20_000 < record["scene"]["primitives"] < 22_000
-    assert bench.text(record).count("\n") > 8
+    assert bench.text(record).count("\n") > 8 and record["against_brute"]["primitives"] == 11
+
+
+def test_every_hierarchy_is_measured_against_brute_force(run):
+    result = against_brute.against_brute(2, (24, 24), 1)
+    rows = {r["technique"]: r for r in result["rows"]}
+    assert {"brute", "bvh:builder=ploc", "bvh:builder=incremental", "r-tree", "sphere-tree", "obb-tree", "kdop-tree", "sorted-list"} <= rows.keys()
+    assert rows["brute"]["x_brute"] == 1.0 and result["primitives"] == 92 and result["rays"] == 576
+    for row in rows.values():
+        assert row["x_brute"] == pytest.approx(rows["brute"]["us_primary"] / row["us_primary"])
+    least = min(r["x_brute"] for r in rows.values())
+    assert result["met"] == (rows["bvh:builder=ploc"]["x_brute"] >= 20 and least >= 5) and not result["met"]
+    assert "NOT MET" in against_brute.text(result)
 
 
 def test_growth_fits_exponents(monkeypatch):

@@ -14,14 +14,18 @@ class _Combined(Volumes):
     parts : list of Volumes
     kinds : tuple of str
         Their kinds.
+    rows : list of int
+        How many numbers of rays each needs, once that was asked for.
     """
 
     def __init__(self, parts, kinds):
-        self.parts, self.kinds = parts, kinds
+        self.parts, self.kinds, self.rows = parts, kinds, None
         super().__init__(np.concatenate([np.maximum.reduce([p.columns[:2] for p in parts]), *(p.own for p in parts)]))
 
     def take(self, index):
-        return type(self)([p.take(index) for p in self.parts], self.kinds)
+        taken = type(self)([p.take(index) for p in self.parts], self.kinds)
+        taken.rows = self.rows
+        return taken
 
     @staticmethod
     def concatenated(parts):

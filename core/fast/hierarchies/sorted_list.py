@@ -1,19 +1,23 @@
 """The flat list, done efficiently: the bounding volumes that each ray meets, sorted by where it enters them.
 
 Primitives are tested in that order, until a hit is nearer than where the next volume begins. (Not: until the first hit.)
-All rays of a chunk are tested against all volumes at once; then each takes the next of its own list in every round.
+Rays are taken in blocks of neighbours: volumes that none of a block can meet, by interval arithmetic on the slab test, are
+left out; the others are tested against its rays, all at once. Then each ray takes the next of its own list in every round.
 """
 
 import numpy as np
 
 from ...hits import Cells
-from ..bounds import maker, meets
+from ..bounds import EPSILON, maker, meets
 from ..structure import Structure
 from .volume_tree import follow
+from .wide import along_curve
 
 #: Pairs of rays and volumes tested at a time. Larger arrays would not stay in the caches, and each new one would be new
 #: memory from the system.
 PAIRS = 8_192
+#: Rays in a block.
+BLOCK = 64
 
 
 class SortedList(Structure):
@@ -33,12 +37,16 @@ class SortedList(Structure):
         """Fill in the figures."""
         n = self.primitives.n
         self.figures.update(N_G=1, N_E=n, N_EE=0, N_ER=n, depth=1, memory=self.volumes.nbytes)
+        self.lo, self.hi = (np.ascontiguousarray(c.T) for c in self.volumes.boxes())
 
     def traverse(self, rays, query):
         values = self.volumes.of_rays(rays)
-        some = max(1, PAIRS // len(self.volumes))
-        lists = [self._met(values, query, np.arange(start, min(start + some, rays.n))) for start in range(0, rays.n, some)]
+        order = self._neighbours(rays)
+        lists = [self._met(values, query, block, self._near(rays, values, query, block))
+                 for block in (order[start:start + BLOCK] for start in range(0, rays.n, BLOCK))]
         ray, item, t_in = (np.concatenate(c) for c in zip(*lists))
+        order = np.argsort(ray, kind="stable")
+        ray, item, t_in = ray[order], item[order], t_in[order]
         if query.counts:
             query.counts.steps(np.arange(rays.n))
         # The place of each ray's next volume, and the end of its list.
@@ -56,14 +64,58 @@ class SortedList(Structure):
             query.test(going, item[place[going]])
             place[going] += 1
 
-    def _met(self, values, query, ray):
-        """Rays, volumes and entries of the pairs that meet, sorted by ray and entry; of equal entries the lower number first."""
-        t_in, t_out = self.volumes.meet_all(values[:, ray], query.t[ray])
-        pair = np.flatnonzero(meets(t_in, t_out))
-        which, item = np.divmod(pair, len(self.volumes))
-        entry = t_in.ravel()[pair]
-        order = np.lexsort((item, entry, which))
-        return ray[which[order]], item[order], entry[order]
+    def _neighbours(self, rays):
+        """An order of rays in which those come together that start, or enter the list's box, near each other and go the same way."""
+        lo, hi = self.lo.min(axis=1)[:, None], self.hi.max(axis=1)[:, None]
+        size = np.where(hi > lo, hi - lo, 1.0)
+        with np.errstate(all="ignore"):
+            start = np.fmin((lo - rays.o) * rays.inverse, (hi - rays.o) * rays.inverse)
+            start = np.maximum(np.fmax.reduce(start), rays.t_min)
+            place = (2.0 * (rays.o + start * rays.d) - lo - hi) / size
+        curve = along_curve(place)
+        octant = (rays.d < 0.0).T @ (1, 2, 4)
+        return curve[np.argsort(octant[curve], kind="stable")]
+
+    def _near(self, rays, values, query, block):
+        """Volumes whose boxes some line between those of a block's rays may meet; never leaves out one that a ray meets."""
+        near, far = np.full(len(self.volumes), values[1][block].min()), np.full(len(self.volumes), query.t[block].max())
+        spare = values[0][block].max()
+        stretch, reach = self.volumes.columns[:2]
+        spare = 16.0 * (spare + np.minimum(spare * stretch, reach)) if self.volumes.loose else 16.0 * spare
+        with np.errstate(all="ignore"):
+            for axis in range(3):
+                inverse, o = rays.inverse[axis].take(block), rays.o[axis].take(block)
+                slow, fast = inverse.min(), inverse.max()
+                if slow * fast <= 0.0 or not np.isfinite([slow, fast]).all():
+                    continue                            # against each other, or along the slabs
+                first, last, low, high = o.min(), o.max(), self.lo[axis], self.hi[axis]
+                if slow < 0.0:                          # seen in a mirror
+                    slow, fast, first, last, low, high = -fast, -slow, -last, -first, -high, -low
+                own = spare + (64.0 * EPSILON) * np.maximum(np.abs(low), np.abs(high))
+                way, end = low - own - last, high + own - first
+                near = np.maximum(near, np.where(way > 0.0, way * slow, way * fast))
+                far = np.minimum(far, np.where(end > 0.0, end * fast, end * slow))
+            return np.flatnonzero(near - 8.0 * EPSILON * np.abs(near) <= far + 8.0 * EPSILON * np.abs(far))
+
+    def _met(self, values, query, ray, near):
+        """Rays, volumes and entries of the pairs that meet, sorted by ray and entry; of equal entries the lower number first.
+
+        `near` are the volumes that come into question.
+        """
+        volumes = self.volumes.take(near)
+        some = max(1, PAIRS // max(1, len(near)))
+        lists = []
+        for start in range(0, len(ray) if len(near) else 0, some):
+            part = ray[start:start + some]
+            t_in, t_out = volumes.meet_all(values[:, part], query.t[part])
+            pair = np.flatnonzero(meets(t_in, t_out))
+            which, item = np.divmod(pair, len(near))
+            lists.append((part[which], near[item], t_in.ravel()[pair]))
+        if not lists:
+            return np.zeros(0, np.int64), near[:0], np.zeros(0)
+        own, item, entry = (np.concatenate(c) for c in zip(*lists))
+        order = np.lexsort((item, entry, own))
+        return own[order], item[order], entry[order]
 
     def cells(self):
         p = self.primitives
