@@ -398,14 +398,17 @@ def bench_verb(call):
         from .lab import needs
         rows = needs.benchmark(tuple(min(side, 256) for side in call.size), repeats=min(call.repeats, 3), say=say)
         return Outcome(report.table(rows, list(rows[0])), report.record("bench", None, None, {"automatic": True, "size": call.size}, rows=rows))
-    from .lab import bench
+    from .lab import against_brute, bench
 
     result = bench.bench(call.subdivisions, call.size, call.repeats, call.seed, say=say)
+    balls = against_brute.against_brute(min(max(call.subdivisions, 1), 4), call.size, min(call.repeats, 3), say=say)
+    result["against_brute"] = balls
+    result["failed"] |= call.subdivisions >= bench.FULL_SIZE and not balls["met"]
     if call.growth:
         result["growth"] = bench.growth(call.seed, say=say)
     record = report.record("bench", result.pop("scene"), call.seed,
                            {"subdivisions": call.subdivisions, "size": call.size, "repeats": call.repeats, "growth": call.growth}, **result)
-    return Outcome(bench.text(record), record, FAILED if result["failed"] else DONE)
+    return Outcome("\n\n".join([bench.text(record), against_brute.text(balls)]), record, FAILED if result["failed"] else DONE)
 
 
 # --- stability --------------------------------------------------------------------------------------------------------
