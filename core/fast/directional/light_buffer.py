@@ -2,7 +2,7 @@
 
 A shadow ray need only be tested against what is listed in the cell through which the light sees its origin, as far as
 that origin; lists may end at a primitive that covers the whole cell, the full occluder. The sun has one parallel window.
-Rays that go to no light, to a light with an extent, or beyond their light are handed over.
+Rays that go to no light, to elsewhere than the centre of one that has an extent, or beyond their light are handed over.
 """
 
 import numpy as np
@@ -45,12 +45,12 @@ class LightBuffer(Handing):
             self.extra = 2.0 * float(max(np.abs(p.lo).max(), np.abs(p.hi).max()))
         self.lights = [light for light in getattr(self.scene, "lights", ()) if self._fits(light)]
         if not self.lights:
-            self.notices.append(self.needs("a point, spot or sun light", "Add one, or name another technique for shadow rays."))
+            self.notices.append(self.needs("a light", "Add one, or name another technique for shadow rays."))
 
     def _fits(self, light):
-        """Whether a light has one place or one direction."""
+        """Whether a light is somewhere; one that has an extent counts as its centre, where hard shadows come from."""
         where = light.direction if light.kind == "sun" else light.position
-        return light.kind in ("point", "spot", "sun") and bool(np.isfinite(where).all()) and (light.kind != "sun" or any(where))
+        return bool(np.isfinite(where).all()) and (light.kind != "sun" or any(where))
 
     def for_light(self, light):
         """The structure for shadow rays to one light; the second where there can be no buffer."""
@@ -126,7 +126,7 @@ class OneLight(Structure):
 
 
 class _Point:
-    """The direction cube of a point or spot light."""
+    """The direction cube of a light that has a place."""
 
     def __init__(self, light, primitives, extra, resolution, most_bytes, **division):
         self.extra = max(extra, float(np.abs(light.position).max()))
@@ -170,9 +170,7 @@ class _Point:
         # From the light, what lies farther than the ray's beginning does not matter.
         with np.errstate(divide="ignore"):
             nearness, end = (1.0 - 4.0 * LOSS) / (z * (1.0 - start)), (1.0 - 4.0 * LOSS) / (z * (1.0 - stop))
-        for k in np.flatnonzero(np.bincount(number, minlength=6)):
-            at = np.flatnonzero(number == k)
-            own[some[at[self.cube.face(int(k)).test(query, ray[at], u[at], v[at], nearness[at], end[at])]]] = False
+        own[some[self.cube.test(query, ray, number, u, v, nearness, end)]] = False
         return own
 
 
@@ -232,7 +230,7 @@ class _Sun:
             with np.errstate(invalid="ignore"):
                 stop = z[seen] + t_max[seen] * along[seen]
                 end = np.where(stop > -np.inf, -stop - 4.0 * LOSS * (np.abs(stop) + np.abs(z[seen])), np.inf)
-            own[seen[self.lists.test(query, which[seen], u[seen], v[seen], nearness, end)]] = False
+            own[seen[self.lists.test(query, which[seen], self.lists.cell(u[seen], v[seen]), u[seen], v[seen], nearness, end)]] = False
         return own
 
 

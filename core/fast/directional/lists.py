@@ -19,8 +19,8 @@ from .view import Footprints
 #: Levels of an adaptive window, where no resolution is asked for.
 LEVELS = 8
 
-#: Cells a footprint, where no resolution is asked for.
-CELLS_PER_PRIMITIVE = 1.0
+#: Cells, where no resolution is asked for: as many as there are footprints, and this many at least.
+CELLS_AT_LEAST = 128 * 128
 #: Cells along a side, at most.
 MOST_ALONG = 2048
 #: Entries that rays look at in their first round; each round doubles them.
@@ -31,22 +31,110 @@ PAIRS = 65_536
 LOSS = 2.0**-20
 
 
-class Lists:
-    """The lists of one window.
+class Listed:
+    """Cells with their lists.
 
     Attributes
     ----------
     feet : Footprints
-        Nearest first.
-    grid : Grid, Quadtree, or None
-        Over the part of the window where there is anything.
     start : ndarray, shape (cells + 1,)
         Where each cell's entries begin.
     entry : ndarray, int32
-        Numbers of footprints, ascending in each cell.
+        Numbers of footprints, nearest first in each cell.
     covered : ndarray
         Footprint of each cell's full occluder, behind which nothing is listed; -1 for none.
+    cuts : bool
+        Whether there may be full occluders.
     nbytes : int
+    """
+
+    def __init__(self, feet, start, entry, covered, cuts):
+        self.feet, self.start, self.entry, self.covered, self.cuts = feet, start, entry, covered, cuts
+        self.nbytes = feet.nbytes + start.nbytes + entry.nbytes + covered.nbytes
+
+    @classmethod
+    def joined(cls, parts):
+        """The cells of several windows, one window after the other."""
+        feet = Footprints.joined([part.feet for part in parts])
+        first = np.cumsum([0] + [len(part.feet) for part in parts])
+        count = [np.diff(part.start) for part in parts]
+        entry = [part.entry + before for part, before in zip(parts, first)]
+        covered = [np.where(part.covered >= 0, part.covered + before, -1) for part, before in zip(parts, first)]
+        return cls(feet, np.concatenate([[0], np.cumsum(np.concatenate(count))]), np.concatenate(entry).astype(np.int32),
+                   np.concatenate(covered), any(part.cuts for part in parts))
+
+    def test(self, query, ray, cell, u, v, nearness, end=None):
+        """Test rays against what is listed where they pass a window.
+
+        Parameters
+        ----------
+        query : Closest or Occluded
+        ray : ndarray
+            Numbers in the batch.
+        cell : ndarray
+        u, v : ndarray
+        nearness : ndarray
+            Least nearness that matters to each ray, with something to spare.
+        end : ndarray, optional
+            Greatest nearness that each ray reaches, or less.
+
+        Returns
+        -------
+        ndarray
+            Positions in `ray` of those that were not tested, since what is not listed may count: behind a full occluder lies what
+            a ray that does not pass it may meet, and what is not the nearest hit.
+        """
+        refused = np.flatnonzero(self.covered.take(cell) >= 0) if self.cuts else np.zeros(0, np.int64)
+        if len(refused) and isinstance(query, Occluded) and end is not None:
+            first = self.feet.nearest.take(self.entry.take(self.start.take(cell.take(refused))))
+            refused = refused[~(end.take(refused) >= first)]
+        if len(refused):
+            tested = np.ones(len(cell), bool)
+            tested[refused] = False
+            cell, ray, u, v, nearness = (c[tested] for c in (cell, ray, u, v, nearness))
+        # Cell by cell: neighbours look at the same entries, which are then at hand.
+        key = np.sort(cell << 32 | np.arange(len(cell)))
+        cell, order = key >> 32, key & 0xFFFFFFFF
+        ray, u, v, nearness = (c.take(order) for c in (ray, u, v, nearness))
+        cursor, end = self.start.take(cell), self.start.take(cell + 1)
+        if query.counts:
+            query.counts.steps(ray)
+            query.counts.elementary(ray, np.flatnonzero(cursor == end))
+        u, v, nearness = (c.astype(np.float32) for c in (u, v, nearness))
+
+        def matters(live):
+            # The nearest entry left must be near enough, and the ray not blocked already.
+            first = self.feet.nearest.take(self.entry.take(cursor.take(live)))
+            return (first >= nearness.take(live)) & (query.t.take(ray.take(live)) > -np.inf)
+
+        for which, place in in_rounds(cursor, end, matters):
+            self._look(query, ray, u, v, nearness, which, self.entry.take(place))
+        return refused
+
+    def _look(self, query, ray, u, v, nearness, which, foot):
+        """Test pairs of rays and footprints."""
+        feet, limit = self.feet, nearness.take(which)
+        # Nearest first: often that alone tells.
+        keep = np.flatnonzero(feet.nearest.take(foot) >= limit)
+        foot, which, limit = foot.take(keep), which.take(keep), limit.take(keep)
+        own_u, own_v = u.take(which), v.take(which)
+        near = feet.near_u.take(foot) * own_u
+        near += feet.near_v.take(foot) * own_v
+        near += feet.near.take(foot)
+        # u and v were rounded, too.
+        near += np.float32(LOSS) * (np.abs(feet.near_u.take(foot)) + np.abs(feet.near_v.take(foot)))
+        keep = np.flatnonzero((near >= limit) & inside(feet, foot, own_u, own_v))
+        if len(keep):
+            query.test(ray.take(which.take(keep)), feet.item.take(foot.take(keep)))
+
+
+class Lists(Listed):
+    """The lists of one window.
+
+    Attributes
+    ----------
+    grid : Grid, Quadtree, or None
+        Over the part of the window where there is anything.
 
     Parameters
     ----------
@@ -70,7 +158,8 @@ class Lists:
         self.view = view
         self.feet = feet = Footprints.of(view, primitives, which=which)
         self.grid, self.entry, self.nbytes = None, np.zeros(0, np.int32), 0
-        self.start, self.covered = np.zeros(1, np.int64), np.zeros(0, np.int64)
+        # Nothing seen: one cell that lists nothing.
+        self.start, self.covered = np.zeros(2, np.int64), np.full(1, -1)
         self.cuts = adaptive or z_buffer is not None
         if not len(feet):
             return
@@ -96,7 +185,7 @@ class Lists:
         if resolution:
             along = [max(1, round(resolution * side / 2.0)) for side in (wide, high)]
         else:
-            cells = CELLS_PER_PRIMITIVE * len(feet)
+            cells = max(len(feet), CELLS_AT_LEAST)
             along = [np.clip(np.sqrt(cells * a / b), 1, MOST_ALONG) for a, b in ((wide, high), (high, wide))]
         while True:
             self.grid = Grid.over(int(along[0]), int(along[1]), u_lo, u_lo + wide, v_lo, v_lo + high)
@@ -154,71 +243,9 @@ class Lists:
         none = np.full(len(u), -1)
         return [self.view.corners(area, z), none + 1, count, none < 0, none, self.covered >= 0]
 
-    def test(self, query, ray, u, v, nearness, end=None):
-        """Test rays against what is listed where they pass the window.
-
-        Parameters
-        ----------
-        query : Closest or Occluded
-        ray : ndarray
-            Numbers in the batch.
-        u, v : ndarray
-        nearness : ndarray
-            Least nearness that matters to each ray, with something to spare.
-        end : ndarray, optional
-            Greatest nearness that each ray reaches, or less.
-
-        Returns
-        -------
-        ndarray
-            Positions in `ray` of those that were not tested, since what is not listed may count: behind a full occluder lies what
-            a ray that does not pass it may meet, and what is not the nearest hit.
-        """
-        if self.grid is None:
-            return np.zeros(0, np.int64)
-        cell = self.grid.cell(u, v)
-        refused = np.flatnonzero(self.covered.take(cell) >= 0) if self.cuts else np.zeros(0, np.int64)
-        if len(refused) and isinstance(query, Occluded) and end is not None:
-            first = self.feet.nearest.take(self.entry.take(self.start.take(cell.take(refused))))
-            refused = refused[~(end.take(refused) >= first)]
-        if len(refused):
-            tested = np.ones(len(cell), bool)
-            tested[refused] = False
-            cell, ray, u, v, nearness = (c[tested] for c in (cell, ray, u, v, nearness))
-        # Cell by cell: neighbours look at the same entries, which are then at hand.
-        key = np.sort(cell << 32 | np.arange(len(cell)))
-        cell, order = key >> 32, key & 0xFFFFFFFF
-        ray, u, v, nearness = (c.take(order) for c in (ray, u, v, nearness))
-        cursor, end = self.start.take(cell), self.start.take(cell + 1)
-        if query.counts:
-            query.counts.steps(ray)
-            query.counts.elementary(ray, np.flatnonzero(cursor == end))
-        u, v, nearness = (c.astype(np.float32) for c in (u, v, nearness))
-
-        def matters(live):
-            # The nearest entry left must be near enough, and the ray not blocked already.
-            first = self.feet.nearest.take(self.entry.take(cursor.take(live)))
-            return (first >= nearness.take(live)) & (query.t.take(ray.take(live)) > -np.inf)
-
-        for which, place in in_rounds(cursor, end, matters):
-            self._look(query, ray, u, v, nearness, which, self.entry.take(place))
-        return refused
-
-    def _look(self, query, ray, u, v, nearness, which, foot):
-        """Test pairs of rays and footprints."""
-        feet, limit = self.feet, nearness.take(which)
-        # Nearest first: often that alone tells.
-        keep = np.flatnonzero(feet.nearest.take(foot) >= limit)
-        foot, which, limit = foot.take(keep), which.take(keep), limit.take(keep)
-        own_u, own_v = u.take(which), v.take(which)
-        near = feet.near_u.take(foot) * own_u
-        near += feet.near_v.take(foot) * own_v
-        near += feet.near.take(foot)
-        # u and v were rounded, too.
-        near += np.float32(LOSS) * (np.abs(feet.near_u.take(foot)) + np.abs(feet.near_v.take(foot)))
-        keep = np.flatnonzero((near >= limit) & inside(feet, foot, own_u, own_v))
-        if len(keep):
-            query.test(ray.take(which.take(keep)), feet.item.take(foot.take(keep)))
+    def cell(self, u, v):
+        """Numbers of the cells where rays pass the window; where nothing is seen there is one, which lists nothing."""
+        return np.zeros(len(u), np.int64) if self.grid is None else self.grid.cell(u, v)
 
 
 def always(low, nearest):

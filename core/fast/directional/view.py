@@ -139,6 +139,11 @@ class Footprints:
     def nbytes(self):
         return sum(getattr(self, f.name).nbytes for f in fields(self))
 
+    @classmethod
+    def joined(cls, parts):
+        """Footprints in several windows."""
+        return cls(*(np.concatenate([getattr(part, f.name) for part in parts]) for f in fields(cls)))
+
     def take(self, index):
         """Some of the footprints."""
         return Footprints(*(getattr(self, f.name).take(index) for f in fields(self)))

@@ -2,7 +2,7 @@
 
 A shadow ray need only be tested against what is listed in the cell through which the light sees its origin, as far as
 that origin; a list ends at a primitive that covers the whole cell, the full occluder. The sun has one parallel window.
-Rays that go to no light, to a light with an extent, or beyond their light are handed over.
+Rays that go to no light, to elsewhere than the centre of one that has an extent, or beyond their light are handed over.
 """
 
 import math
@@ -46,7 +46,7 @@ class LightBuffer(Handing):
         self.extra = 2.0 * max(abs(c) for p in self.primitives for c in (*p.lo, *p.hi))
         self.lights = [light for light in getattr(self.scene, "lights", ()) if _fits(light)]
         if not self.lights:
-            self.notices.append(self.needs("a point, spot or sun light", "Add one, or name another technique for shadow rays."))
+            self.notices.append(self.needs("a light", "Add one, or name another technique for shadow rays."))
 
     def for_light(self, light):
         """The structure for shadow rays to one light; the second where there can be no buffer."""
@@ -124,13 +124,13 @@ class OneLight(Structure):
 
 
 def _fits(light):
-    """Whether a light has one place or one direction."""
+    """Whether a light is somewhere; one that has an extent counts as its centre, where hard shadows come from."""
     where = light.direction if light.kind == "sun" else light.position
-    return light.kind in ("point", "spot", "sun") and all(map(math.isfinite, where)) and (light.kind != "sun" or any(where))
+    return all(map(math.isfinite, where)) and (light.kind != "sun" or any(where))
 
 
 class _Point:
-    """The direction cube of a point or spot light."""
+    """The direction cube of a light that has a place."""
 
     def __init__(self, light, primitives, extra, divide):
         self.extra = max(extra, *map(abs, light.position))
