@@ -24,8 +24,11 @@ BOX = ((0, 2, 3, 1), (4, 5, 7, 6), (0, 1, 5, 4), (2, 6, 7, 3), (0, 4, 6, 2), (1,
 class Faces:
     """Convex polygons, and the surfaces that they are parts of.
 
+    All places are relative to an origin: where the eye is, small numbers are exact.
+
     Attributes
     ----------
+    origin : ndarray, shape (3,)
     corners : ndarray, shape (n, CORNERS, 3)
         After the last one the first is repeated.
     count : ndarray, shape (n,)
@@ -60,12 +63,13 @@ class Faces:
     box_lo: np.ndarray
     box_hi: np.ndarray
     hidden: list
+    origin: np.ndarray
 
     def __len__(self):
         return len(self.count)
 
     @classmethod
-    def of(cls, objects):
+    def of(cls, objects, origin=(0.0, 0.0, 0.0)):
         """The faces of all objects; instances are copied into world space."""
         everything = Layout.of(objects, copies_at_most=np.inf)
         parts = [_of_meshes(objects, everything.meshes)]
@@ -88,7 +92,9 @@ class Faces:
         lo, hi = (np.array([b[k] for b in boxes]).reshape(-1, 3) for k in (0, 1))
         corners.append(_of_boxes(lo, hi, int(ends[-1])))
         names = [f"{n} of the kind {'combination (CSG)' if kind == 'csg' else kind}" for kind, n in hidden.items()]
-        faces = cls(*(np.concatenate(column) for column in zip(*corners)), *surfaces, None, lo, hi, names)
+        faces = cls(*(np.concatenate(column) for column in zip(*corners)), *surfaces, None, lo, hi, names, np.asarray(origin, float))
+        for name in ("corners", "anchor", "box_lo", "box_hi"):
+            setattr(faces, name, getattr(faces, name) - faces.origin)
         faces.bent = _bent(objects, faces)
         return faces
 
@@ -115,16 +121,16 @@ def _of_triangles(corners, object_of, primitive_of, flip):
     u and v are the weights of the second and the third corner: linear in the point.
     """
     e, f = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
-    size = np.abs(np.concatenate([e, f], axis=1)).max(axis=1, initial=0.0)
-    unit = np.where(size > 0.0, size, 1.0)[:, None]
-    n = np.cross(e / unit, f / unit)
+    # Each edge by its own size: one corner may be very far away.
+    sizes = [np.abs(edge).max(axis=1, initial=0.0) for edge in (e, f)]
+    e, f = (edge / np.where(size > 0.0, size, 1.0)[:, None] for edge, size in zip((e, f), sizes))
+    n = np.cross(e, f)
     length = np.sqrt((n * n).sum(axis=1))
     # Three points in a line but for rounding have no plane.
     keep = np.flatnonzero(length > 64 * 2.0**-53)
-    corners, e, f, n, length, unit = (a[keep] for a in (corners, e, f, n, length, unit))
+    corners, e, f, n, length, one, other = (a[keep] for a in (corners, e, f, n, length, *sizes))
     n = n / length[:, None]
-    by = (length * unit[:, 0])[:, None]  # twice the area over the size
-    across = np.stack([np.cross(f / unit, n) / by, np.cross(n, e / unit) / by], axis=1)
+    across = np.stack([np.cross(f, n) / (length * one)[:, None], np.cross(n, e) / (length * other)[:, None]], axis=1)
     padded = np.concatenate([corners, np.repeat(corners[:, :1], CORNERS - 3, axis=1)], axis=1)
     m = len(keep)
     normal = np.where(flip[keep, None], -n, n)

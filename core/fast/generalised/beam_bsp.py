@@ -13,7 +13,7 @@ from .beam_clip import cut, joined, sides
 CANDIDATES = 8
 #: How much worse a cut is than one face more on the heavier side.
 CUT = 4
-#: Corners nearer to a plane than this, relative to the scene's coordinates, lie in it.
+#: Corners nearer to a plane than this, relative to their coordinates and its distance, lie in it.
 TOLERANCE = 2.0**-40
 
 
@@ -38,11 +38,9 @@ class Bsp:
         The faces, node by node, with the lower surface first.
     face, face_plane, turn
         Which face each was cut from; its plane; 1 where it is counter-clockwise seen from above that, else -1.
-    tolerance : float
     """
 
     def __init__(self, faces, most, check):
-        self.tolerance = TOLERANCE * max(float(np.abs(faces.corners).max(initial=0.0)), 1e-300)
         planes = _planes(faces)
         points, count, surface, plane_of = faces.corners, faces.count, faces.surface, np.arange(len(faces))
         node = np.zeros(len(faces), np.int64)
@@ -59,7 +57,7 @@ class Bsp:
             under, over = np.flatnonzero((low < 0) & (high <= 0)), np.flatnonzero((low >= 0) & (high > 0))
             both = np.flatnonzero((low < 0) & (high > 0))
             own = plane[node[both]]
-            halves = cut(points[both], count[both], _height(points[both], own), side[both]) if len(both) else []
+            halves = cut(points[both], count[both], heights(points[both], own)[0], side[both]) if len(both) else []
             # Children: 2 k and 2 k + 1 for node k, then only those that have faces.
             child = np.concatenate([2 * node[under], 2 * node[over] + 1, 2 * node[both], 2 * node[both] + 1])
             source = np.concatenate([under, over, both, both])
@@ -101,6 +99,8 @@ class Bsp:
             for child in (self.below[k], self.above[k]):
                 if child >= 0:
                     self.lo[k], self.hi[k] = np.minimum(self.lo[k], self.lo[child]), np.maximum(self.hi[k], self.hi[child])
+        room = TOLERANCE * np.maximum(np.abs(self.lo), np.abs(self.hi))
+        self.lo, self.hi = self.lo - room, self.hi + room
 
     def _divided(self, points, node, planes, m):
         """The best plane of each of m nodes, and on which sides of it the faces' corners are."""
@@ -109,7 +109,7 @@ class Bsp:
         best, plane = np.full(m, np.inf), np.zeros((m, 4))
         side = np.zeros(points.shape[:2], np.int8)
         for own, usable in self._candidates(points, node, planes, first, number):
-            tried = sides(_height(points, own[node]), self.tolerance)
+            tried = sides(*heights(points, own[node]))
             low, high = tried.min(axis=1) < 0, tried.max(axis=1) > 0
             under, over = np.bincount(node, low, m), np.bincount(node, high, m)
             score = CUT * np.bincount(node, low & high, m) + np.abs(under - over)
@@ -162,7 +162,10 @@ def _turns(faces, planes):
     return np.where((np.cross(e, f).sum(axis=1) * planes[:, :3]).sum(axis=1) < 0.0, -1.0, 1.0)
 
 
-def _height(points, plane):
-    """Heights of corners above planes, one each."""
+def heights(points, plane):
+    """Heights of corners, shape (n, v, 3), above planes, one each; and those that are none."""
     p = plane[:, None]
-    return points[..., 0] * p[..., 0] + points[..., 1] * p[..., 1] + points[..., 2] * p[..., 2] + p[..., 3]
+    products = [points[..., k] * p[..., k] for k in range(3)]
+    height = products[0] + products[1] + products[2] + p[..., 3]
+    slack = np.abs(products[0]) + np.abs(products[1]) + np.abs(products[2]) + np.abs(p[..., 3])
+    return height, TOLERANCE * slack

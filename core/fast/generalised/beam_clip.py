@@ -55,8 +55,11 @@ def cut(points, count, distance, side):
     following = np.roll(points, -1, axis=1)
     ahead, side_ahead = np.roll(distance, -1, axis=1), np.roll(side, -1, axis=1)
     row, place = np.nonzero(live & (side * side_ahead < 0))
-    d0, d1 = distance[row, place], ahead[row, place]
-    new = points[row, place] + (d0 / (d0 - d1))[:, None] * (following[row, place] - points[row, place])
+    # From the nearer end: neighbours find the same point, and the other may be very far away.
+    a, b, d0, d1 = points[row, place], following[row, place], distance[row, place], ahead[row, place]
+    turned = np.abs(d0) > np.abs(d1)
+    a[turned], b[turned], d0[turned], d1[turned] = b[turned], a[turned], d1[turned], d0[turned]
+    new = a + (d0 / (d0 - d1))[:, None] * (b - a)
     crossing = np.zeros((n, v), np.int64)
     crossing[row, place] = 1
     parts = []

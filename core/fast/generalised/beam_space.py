@@ -83,9 +83,10 @@ class Beams:
         return p - ((p * plane[:, :3]).sum(axis=1) + plane[:, 3])[:, None] * plane[:, :3]
 
 
-def eye_beam(camera, size):
-    """The first beam of a camera's picture."""
+def eye_beam(camera, size, origin):
+    """The first beam of a camera's picture; places are relative to `origin`."""
     position, right, up, forward = camera.frame()
+    position = position - origin
     left, right_, bottom, top = camera.window
     x, y = size[0] / (right_ - left), size[1] / (top - bottom)
     window = np.array([[x, 0.0, 0.0, -left * x], [0.0, y, 0.0, -bottom * y], [0.0, 0.0, 1.0, 0.0], [0.0, 0.0, 0.0, 1.0]])
@@ -94,13 +95,12 @@ def eye_beam(camera, size):
     return _first(position, right, up, forward, window, camera.kind == "perspective", near, end, PRIMARY, -1)
 
 
-def light_beams(light, number, lo, hi):
-    """Beams from a light over a scene's box: six through the sides of a cube, or the parallel one of the sun."""
+def light_beams(light, number, position, lo, hi):
+    """Beams from a light at `position` over a scene's box: six through a cube's sides, or the parallel one of the sun."""
     half = 0.5 * LIGHT
     window = np.diag([half, half, 1.0, 1.0])
     window[:2, 3] = half
     if light.kind != "sun":
-        position = np.asarray(light.position, float)
         beams = []
         for axis in range(3):
             for sign in (1.0, -1.0):

@@ -297,7 +297,7 @@ class BeamTracer(Whitted):
         # How much farther they may go: as far as the beam does.
         end = tree.beams.end[beam]
         with np.errstate(divide="ignore", invalid="ignore"):
-            rest = (end[:, :3] * hits.point).sum(axis=1) + end[:, 3]
+            rest = (end[:, :3] * (hits.point - tree.faces.origin)).sum(axis=1) + end[:, 3]
             rest = np.where(end[:, :3].any(axis=1), -rest / (end[:, :3] * d.T).sum(axis=1), np.inf)
         kind = tree.beams.kind[beam].astype(np.uint8)
         wave = Wave(hits.point.T - d, d, rest, tree.weights(beam, xy) * share, pixel,

@@ -21,6 +21,8 @@ STEEPEST = 0.99
 ROUNDING = 16 * 2.0**-52
 #: Planes that differ by less than this are one mirror.
 SAME = 1e-6
+#: Boxes in one plane are as thick as this, relative to their coordinates.
+CLOSE = 2.0**-40
 #: Pairs of fragments and lit polygons that are looked at together.
 PAIRS = 1 << 17
 
@@ -93,20 +95,20 @@ class BeamTree:
         """All levels."""
         camera, faces = scene.camera, self.faces
         window = np.array([(0.0, 0.0), (size[0], 0.0), size, (0.0, size[1])], float)
-        parts, self.beams = [window], eye_beam(camera, size)
+        parts, self.beams = [window], eye_beam(camera, size, faces.origin)
         lo, hi = (f(faces.corners.reshape(-1, 3), axis=0) if len(faces) else np.zeros(3) for f in (np.min, np.max))
         for k, light in enumerate(lights):
-            position = np.asarray(light.position, float)
+            position = np.asarray(light.position, float) - faces.origin
             if self.bsp is None or (light.kind != "sun" and self._in_box(position, position)):
                 self.dark.add(k)
                 continue
-            for beam in light_beams(light, k, lo, hi):
+            for beam in light_beams(light, k, position, lo, hi):
                 self.beams = self.beams.joined(beam)
                 parts.append(LIGHT * np.array([(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)]))
         n = len(parts)
         points, count = np.array(parts), np.full(n, 4)
         self.tests = self.steps = self.pieces = self.seen = np.zeros(0, np.int64)
-        if self.bsp is None or self._in_box(*_near(camera)):
+        if self.bsp is None or self._in_box(*(p - faces.origin for p in _near(camera))):
             found = Fragments(np.zeros(1, np.int64), np.array([self.unknown]), np.full(1, -1), points[:1], count[:1])
             if n > 1:
                 lit = self._walked(np.arange(1, n), np.full(n - 1, -1), points[1:], count[1:])
@@ -173,7 +175,8 @@ class BeamTree:
         point = self.beams.at(beam, self.plane[surface], xy)
         off = point - faces.anchor[surface]
         u, v = ((faces.across[surface, k] * off).sum(axis=1) + faces.start[surface, k] for k in range(2))
-        error = ROUNDING * (np.abs(point) + np.abs(faces.anchor[surface])).max(axis=1, initial=0.0)
+        point = point + faces.origin
+        error = ROUNDING * (np.abs(point) + np.abs(off)).max(axis=1, initial=0.0)
         hits = Hits(np.zeros(len(beam)), faces.primitive[surface], faces.object[surface], u, v,
                     np.zeros(len(beam), np.int32), faces.normal[surface], point, error)
         d = np.ascontiguousarray(self.beams.ahead(beam, xy).T)
@@ -331,12 +334,13 @@ class BeamTree:
             plane = self.plane[faces.surface[fragment]]
             # On the side that is looked at, and not far off it.
             same = (plane * source[faces.beam[fragment]]).sum(axis=1) * (plane * source[self.lit.beam[b]]).sum(axis=1) > 0.0
-            near = ((own_lo[a] <= hi[b] + self.bsp.tolerance) & (own_hi[a] >= lo[b] - self.bsp.tolerance)).all(axis=1)
+            room = CLOSE * (np.abs(lo[b]) + np.abs(hi[b]))
+            near = ((own_lo[a] <= hi[b] + room) & (own_hi[a] >= lo[b] - room)).all(axis=1)
             some = np.flatnonzero(same & near)
             fragment, b = fragment[some], b[some]
             turn = self.beams.hand[self.lit.beam[b]] * np.sign(self.beams.sight(self.lit.beam[b], plane[some]))
             line, seen, _ = outlines(
-                self.beams, faces.beam[fragment], world[b], self.lit.count[b], plane[some], turn, self.bsp.tolerance
+                self.beams, faces.beam[fragment], world[b], self.lit.count[b], plane[some], turn
             )
             points, count = faces.points[fragment], faces.count[fragment]
             d = distances(line, points)

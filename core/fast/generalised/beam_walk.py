@@ -9,6 +9,7 @@ what is left of its walk.
 
 import numpy as np
 
+from .beam_bsp import heights
 from .beam_clip import boxes, cut, joined, sides, widened
 
 #: Lines nearer than this to a corner, in pixels, pass through it.
@@ -158,7 +159,7 @@ class Walk:
         """Whether the boxes of nodes reach into the half-spaces around pieces."""
         lo, hi = self.bsp.lo[node], self.bsp.hi[node]
         plane = self.sight[piece]
-        centre, half = 0.5 * (lo + hi), 0.5 * (hi - lo) + self.bsp.tolerance
+        centre, half = 0.5 * (lo + hi), 0.5 * (hi - lo)
         normal = plane[..., :3]
         height = np.matmul(normal, centre[..., None])[..., 0] + plane[..., 3]
         reach = np.matmul(np.abs(normal), half[..., None])[..., 0]
@@ -189,7 +190,7 @@ class Walk:
         self._push(piece[more], len(bsp) + face[more] + 1)
         self.tests += np.bincount(beam, minlength=len(self.beams))
         line, seen, h = outlines(
-            self.beams, beam, bsp.points[face], bsp.count[face], bsp.face_plane[face], bsp.turn[face], bsp.tolerance
+            self.beams, beam, bsp.points[face], bsp.count[face], bsp.face_plane[face], bsp.turn[face]
         )
         d = distances(line, self.points[piece])
         seen &= ~(d.max(axis=2) <= TOLERANCE).any(axis=1) & ~_apart(self.points[piece], h)
@@ -228,7 +229,7 @@ def distances(line, points):
     return np.matmul(line[..., :2], points.transpose(0, 2, 1)) + line[..., 2:]
 
 
-def outlines(beams, beam, points, count, plane, turn, tolerance):
+def outlines(beams, beam, points, count, plane, turn):
     """Lines around faces in the picture of their beams.
 
     Parameters
@@ -241,8 +242,6 @@ def outlines(beams, beam, points, count, plane, turn, tolerance):
     plane : ndarray, shape (m, 4)
     turn : ndarray, shape (m,)
         1 where the corners are counter-clockwise seen from above the plane, else -1.
-    tolerance : float
-        Heights that are none.
 
     Returns
     -------
@@ -262,9 +261,9 @@ def outlines(beams, beam, points, count, plane, turn, tolerance):
     line[:, :v][np.arange(v) >= count[:, None]] = 0.0
     seen = np.abs(sight) > EDGE_ON
     for k, limit in enumerate((beams.start[beam], beams.end[beam])):
-        height = np.matmul(points, limit[:, :3, None])[..., 0] + limit[:, 3:]
-        seen &= height.max(axis=1) > tolerance
-        some = np.flatnonzero(seen & (height.min(axis=1) < -tolerance))
+        side = sides(*heights(points, limit))
+        seen &= (side > 0).any(axis=1)
+        some = np.flatnonzero(seen & (side < 0).any(axis=1))
         if len(some):
             own = np.einsum("mk,mkl->ml", limit[some], beams.back[beam[some]])
             near = beams.nearness(beam[some], plane[some])

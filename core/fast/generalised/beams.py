@@ -33,7 +33,7 @@ class Beams(Handing):
         most = self.parameters["max_fragments"]
         if self._faces is None:
             check_memory(most)
-            faces = Faces.of(self.scene.objects)
+            faces = Faces.of(self.scene.objects, self.scene.camera.frame()[0])
             try:
                 if len(faces) > most:
                     raise TooMany
@@ -82,7 +82,8 @@ class Beams(Handing):
         near[first] = camera.rays(*xy[first].T, tree.size)[0]
         near[~first] = beams.at(beams.parent[beam[~first]], tree.plane[beams.mirror[beam[~first]]], xy[~first])
         parent = np.where(found.source[own] >= 0, number[found.source[own]], -1)
-        ends = list(zip(near.reshape(-1, v, 3), far.reshape(-1, v, 3)))
+        near[~first] += tree.faces.origin
+        ends = list(zip(near.reshape(-1, v, 3), (far + tree.faces.origin).reshape(-1, v, 3)))
         cells = cells_of(ends, tree.level[own], parent)
         leaves = int(np.count_nonzero(cells.leaf))
         self.figures.update(N_G=len(cells) - leaves, N_E=leaves, N_EE=0, N_ER=leaves, depth=int(tree.level.max(initial=0)))

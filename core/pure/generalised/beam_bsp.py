@@ -6,14 +6,14 @@ Kedem and Naylor 1980), and, where these would make a chain of the tree, medians
 
 from dataclasses import dataclass, field, replace
 
-from .beam_clip import box, cut, sides
+from .beam_clip import box, cut
 from .beam_space import height
 
 #: Planes of faces that are tried in a node.
 CANDIDATES = 8
 #: How much worse a cut is than one face more on the heavier side.
 CUT = 4
-#: Corners nearer to a plane than this, relative to the scene's coordinates, lie in it.
+#: Corners nearer to a plane than this, relative to their coordinates and its distance, lie in it.
 TOLERANCE = 2.0**-40
 
 
@@ -74,15 +74,11 @@ class Bsp:
     Attributes
     ----------
     root : Node or None
-    tolerance : float
-        Heights that are none.
     nodes, faces : int
         How many there are, cut ones too.
     """
 
     def __init__(self, faces, most, check):
-        largest = max((abs(x) for corners in faces.corners.tolist() for p in corners for x in p), default=0.0)
-        self.tolerance = TOLERANCE * max(largest, 1e-300)
         self.root, self.nodes, self.faces = None, 0, 0
         todo, waiting = [(faces_of(faces), None, "")], len(faces)
         while todo:
@@ -105,7 +101,7 @@ class Bsp:
         """A node for faces, and those that go below and above it."""
         best, plane, chosen = None, (0.0,) * 4, [[0] * len(f.points) for f in faces]
         for own in self._candidates(faces):
-            tried = [sides([height(own, p) for p in f.points], self.tolerance) for f in faces]
+            tried = [sides_of(own, f.points) for f in faces]
             under, over = sum(min(s) < 0 for s in tried), sum(max(s) > 0 for s in tried)
             score = CUT * sum(min(s) < 0 < max(s) for s in tried) + abs(under - over)
             # A plane that leaves all faces on one side does nothing.
@@ -127,6 +123,8 @@ class Bsp:
         for part in (lower, upper):
             part.sort(key=lambda f: f.surface)
         lo, hi = tuple(map(min, zip(*(f.lo for f in faces)))), tuple(map(max, zip(*(f.hi for f in faces))))
+        room = [TOLERANCE * max(abs(l), abs(h)) for l, h in zip(lo, hi)]
+        lo, hi = tuple(l - r for l, r in zip(lo, room)), tuple(h + r for h, r in zip(hi, room))
         return Node(plane, within, lo, hi), lower, upper
 
     @staticmethod
@@ -139,6 +137,17 @@ class Bsp:
             for axis in range(3):
                 middle = sorted(0.5 * (f.lo[axis] + f.hi[axis]) for f in faces)[n // 2]
                 yield (*(float(k == axis) for k in range(3)), -middle)
+
+
+def sides_of(plane, points):
+    """On which sides of a plane points are: -1, 0 or 1."""
+    found = []
+    for p in points:
+        products = [x * n for x, n in zip(p, plane)]
+        h = products[0] + products[1] + products[2] + plane[3]
+        slack = TOLERANCE * (abs(products[0]) + abs(products[1]) + abs(products[2]) + abs(plane[3]))
+        found.append((h > slack) - (h < -slack))
+    return found
 
 
 def faces_of(faces):

@@ -39,8 +39,10 @@ def cut(points, distances, side):
             outside.append(p)
         k = (i + 1) % len(points)
         if s * side[k] < 0:
-            share = distances[i] / (distances[i] - distances[k])
-            crossing = tuple(x + share * (y - x) for x, y in zip(p, points[k]))
+            # From the nearer end: neighbours find the same point, and the other may be very far away.
+            near, far = (k, i) if abs(distances[i]) > abs(distances[k]) else (i, k)
+            share = distances[near] / (distances[near] - distances[far])
+            crossing = tuple(x + share * (y - x) for x, y in zip(points[near], points[far]))
             inside.append(crossing)
             outside.append(crossing)
     return inside, outside

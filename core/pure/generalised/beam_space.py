@@ -12,7 +12,7 @@ Matrices are lists of rows; a plane is (normal x, y, z, distance), its height ov
 import math
 from dataclasses import dataclass
 
-from ..tracing.vectors import add, cross, dot, times, unit
+from ..tracing.vectors import add, cross, dot, minus, times, unit
 
 #: The window of a light is so many pixels across.
 LIGHT = 1024.0
@@ -106,9 +106,10 @@ class Beam:
         return add(p, times(-height(plane, p), plane))
 
 
-def eye_beam(camera, size):
-    """The first beam of a camera's picture."""
+def eye_beam(camera, size, origin):
+    """The first beam of a camera's picture; places are relative to `origin`."""
     position, right, up, forward = (tuple(v.tolist()) for v in camera.frame())
+    position = minus(position, origin)
     left, right_, bottom, top = map(float, camera.window)
     x, y = size[0] / (right_ - left), size[1] / (top - bottom)
     window = (x, y, -left * x, -bottom * y)
@@ -118,11 +119,11 @@ def eye_beam(camera, size):
     return _first(position, right, up, forward, window, camera.kind == "perspective", near, end, PRIMARY, -1)
 
 
-def light_beams(light, number, lo, hi):
-    """Beams from a light over a scene's box: six through the sides of a cube, or the parallel one of the sun."""
+def light_beams(light, number, position, lo, hi):
+    """Beams from a light at `position` over a scene's box: six through a cube's sides, or the parallel one of the sun."""
     half = 0.5 * LIGHT
     if light.kind != "sun":
-        position, beams = tuple(map(float, light.position)), []
+        beams = []
         for axis in range(3):
             for sign in (1.0, -1.0):
                 forward = tuple(sign * (k == axis) for k in range(3))

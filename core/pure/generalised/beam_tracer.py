@@ -150,7 +150,7 @@ class BeamTracer(Whitted):
             n = max(math.ceil(SAMPLES * area - 1e-9), 1)
             for i in range(n):
                 key = sampling.first_key(y * self.size[0] + x, i, self.seed)
-                stack += self._sent(f, number, _random_point(points, key), area / n, sampling.mix((key + number) & sampling.MASK))
+                stack += self._rays_for(f, number, _random_point(points, key), area / n, sampling.mix((key + number) & sampling.MASK))
         while stack:
             for path, hit, surface in self._met(stack.pop()):
                 if surface is None:
@@ -210,7 +210,7 @@ class BeamTracer(Whitted):
         hit.t = dot(minus(hit.point, position), forward)
         return hit, surface
 
-    def _sent(self, fragment, number, xy, part, key):
+    def _rays_for(self, fragment, number, xy, part, key):
         """Yield rays through a point of a fragment, for what beams do not know; `part` is their part of the pixel."""
         tree, beam = self.tree, fragment.beam
         key = key if self.soft or self.roulette else None
@@ -233,7 +233,7 @@ class BeamTracer(Whitted):
         hit, at, d = self.tree.surface_at(beam, surface, xy)
         # How much farther it may go: as far as the beam does.
         speed = -dot(beam.end, d)
-        rest = height(beam.end, hit.point) / speed if speed else math.inf
+        rest = height(beam.end, minus(hit.point, self.tree.origin)) / speed if speed else math.inf
         weight = times(part, self.tree.weight(beam, xy))
         return Path(minus(hit.point, d), d, 0.0, rest, weight, beam.depth, beam.kind, key), at
 

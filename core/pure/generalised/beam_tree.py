@@ -9,7 +9,7 @@ import math
 from ..structure import Hit
 from ..tracing.optics import refract
 from ..tracing.secondary import index_of_refraction, mirrored_and_refracted
-from ..tracing.vectors import dot, minus, mul, unit
+from ..tracing.vectors import add, dot, minus, mul, unit
 from .beam_clip import area_and_centre, box
 from .beam_space import LIGHT, NOWHERE, REFLECTED, REFRACTED, TRANSPARENT, Beam, eye_beam, light_beams, product
 from .beam_walk import TOLERANCE, Fragment, Walk, carved, distances, outline
@@ -21,6 +21,8 @@ STEEPEST = 0.99
 ROUNDING = 16 * 2.0**-52
 #: Planes that differ by less than this are one mirror.
 SAME = 1e-6
+#: Boxes in one plane are as thick as this, relative to their coordinates.
+CLOSE = 2.0**-40
 
 
 class BeamTree:
@@ -68,7 +70,7 @@ class BeamTree:
 
     def __init__(self, scene, faces, bsp, surfaces, size, depth, most, check, lights=(), threshold=0.0):
         self.bsp, self.surfaces, self.depth, self.most, self.check = bsp, surfaces, depth, most, check
-        self.threshold = threshold
+        self.threshold, self.origin = threshold, tuple(faces.origin.tolist())
         self.normals, self.anchors = [tuple(n) for n in faces.normal.tolist()], [tuple(a) for a in faces.anchor.tolist()]
         self.planes = [(*n, -(n[0] * a[0] + n[1] * a[1] + n[2] * a[2])) for n, a in zip(self.normals, self.anchors)]
         self.objects, self.primitives = faces.object.tolist(), faces.primitive.tolist()
@@ -84,20 +86,20 @@ class BeamTree:
     def _cast(self, scene, size, lights):
         """All levels."""
         camera = scene.camera
-        self.beams = [eye_beam(camera, size)]
+        self.beams = [eye_beam(camera, size, self.origin)]
         w, h = map(float, size)
         window = [(0.0, 0.0), (w, 0.0), (w, h), (0.0, h)]
         pieces = [(self.beams[0], None, window)]
         lo, hi = (self.bsp.root.lo, self.bsp.root.hi) if self.bsp and self.bsp.root else ((0.0,) * 3, (0.0,) * 3)
         for k, light in enumerate(lights):
-            position = tuple(map(float, light.position))
+            position = minus(tuple(map(float, light.position)), self.origin)
             if self.bsp is None or (light.kind != "sun" and self._in_box(position, position)):
                 self.dark.add(k)
                 continue
-            for beam in light_beams(light, k, lo, hi):
+            for beam in light_beams(light, k, position, lo, hi):
                 self.beams.append(beam)
                 pieces.append((beam, None, [(0.0, 0.0), (LIGHT, 0.0), (LIGHT, LIGHT), (0.0, LIGHT)]))
-        if self.bsp is None or self._in_box(*_near(camera)):
+        if self.bsp is None or self._in_box(*(minus(p, self.origin) for p in _near(camera))):
             found = [Fragment(self.beams[0], self.unknown, None, window), *self._walked(pieces[1:], 0)]
         else:
             found = self._walked(pieces, 0)
@@ -145,7 +147,8 @@ class BeamTree:
         point = beam.at(self.planes[surface], xy)
         off = minus(point, self.anchors[surface])
         u, v = (dot(g, off) + s for g, s in zip(self.across[surface], self.start[surface]))
-        error = ROUNDING * max(abs(p) + abs(a) for p, a in zip(point, self.anchors[surface]))
+        point = add(point, self.origin)
+        error = ROUNDING * max(abs(p) + abs(o) for p, o in zip(point, off))
         hit = Hit(0.0, self.primitives[surface], self.objects[surface], u, v, 0, self.normals[surface], point, error, -1)
         d = beam.ahead(xy)
         return hit, self.surfaces.at(hit, d), d
@@ -238,7 +241,6 @@ class BeamTree:
         for own in self.lit.values():
             for f in own:
                 world[id(f)] = self._in_world(f)
-        tolerance = self.bsp.tolerance if self.bsp else 0.0
         for f in self.fragments:
             self.check()
             if not self.lit.get(f.surface):
@@ -251,9 +253,9 @@ class BeamTree:
                 corners = world[id(lit)]
                 low, high = box(corners)
                 # On the side that is looked at, and not far off it.
-                if not (front * light > 0.0 and all(a <= y + tolerance and b >= x - tolerance for a, b, x, y in zip(lo, hi, low, high))):
+                if not (front * light > 0.0 and all(map(_near_by, lo, hi, low, high))):
                     continue
-                lines, _ = outline(f.beam, corners, plane, lit.beam.hand * math.copysign(1.0, light), tolerance)
+                lines, _ = outline(f.beam, corners, plane, lit.beam.hand * math.copysign(1.0, light))
                 if not lines or any(max(distances(line, f.points)) <= TOLERANCE for line in lines):
                     continue
                 points, _ = carved(f.points, lines)
@@ -295,6 +297,12 @@ def _along(plane, change):
     """The matrix that moves points along a plane's normal by a multiple of their height."""
     rows = [[float(r == c) + change * plane[r] * plane[c] for c in range(4)] for r in range(3)]
     return [*rows, [0.0, 0.0, 0.0, 1.0]]
+
+
+def _near_by(lo, hi, low, high):
+    """Whether two stretches touch, but for rounding."""
+    room = CLOSE * (abs(low) + abs(high))
+    return lo <= high + room and hi >= low - room
 
 
 def _near(camera):

@@ -9,7 +9,7 @@ is a list linked from front to back, so that the parts of a piece share what is 
 import math
 from dataclasses import dataclass
 
-from .beam_bsp import Node
+from .beam_bsp import Node, sides_of
 from .beam_clip import box, cut, sides
 from .beam_space import height
 
@@ -70,7 +70,7 @@ class Walk:
         out, outlines = [], {}
         todo = []
         for beam, source, points in pieces:
-            waits = (self.bsp.root, None) if self.bsp.root and inside(beam, box(points), self.bsp.root, self.bsp.tolerance) else None
+            waits = (self.bsp.root, None) if self.bsp.root and inside(beam, box(points), self.bsp.root) else None
             todo.append((beam, source, points, waits))
         while todo:
             self.check()
@@ -88,7 +88,7 @@ class Walk:
                     continue
                 key = id(beam), id(task)
                 if key not in outlines:
-                    outlines[key] = outline(beam, task.points, task.plane, task.turn, self.bsp.tolerance)
+                    outlines[key] = outline(beam, task.points, task.plane, task.turn)
                 beam.tests += 1
                 seen, parts = self._met(points, outlines[key])
                 if seen:
@@ -103,12 +103,12 @@ class Walk:
         beam.steps += 1
         front = sum(p * e for p, e in zip(node.plane, beam.eye)) >= 0.0
         near, far = (node.above, node.below) if front else (node.below, node.above)
-        around, tolerance = box(points), self.bsp.tolerance
-        if far and inside(beam, around, far, tolerance):
+        around = box(points)
+        if far and inside(beam, around, far):
             rest = (far, rest)
         for face in reversed(node.faces):
             rest = (face, rest)
-        if near and inside(beam, around, near, tolerance):
+        if near and inside(beam, around, near):
             rest = (near, rest)
         return rest
 
@@ -121,7 +121,7 @@ class Walk:
         return (seen, parts) if seen else ([], [points])
 
 
-def inside(beam, around, node, tolerance):
+def inside(beam, around, node):
     """Whether a node's box reaches into the half-spaces around a piece, given by its rectangle."""
     (x0, y0), (x1, y1) = around
     x, y, _, w = beam.map
@@ -133,7 +133,7 @@ def inside(beam, around, node, tolerance):
         beam.start,
     ]
     centre = [0.5 * (l + h) for l, h in zip(node.lo, node.hi)]
-    half = [0.5 * (h - l) + tolerance for l, h in zip(node.lo, node.hi)]
+    half = [0.5 * (h - l) for l, h in zip(node.lo, node.hi)]
     for plane in planes:
         reach = sum(abs(p) * h for p, h in zip(plane, half))
         # Rounding, of numbers as large as the map's.
@@ -142,7 +142,7 @@ def inside(beam, around, node, tolerance):
     return True
 
 
-def outline(beam, points, plane, turn, tolerance):
+def outline(beam, points, plane, turn):
     """Lines around a face in the picture of a beam, inside positive, distances in pixels; and its corners (x w, y w, w).
 
     No lines for a face seen edge-on, or outside of the half-spaces that the beam is confined to.
@@ -157,10 +157,10 @@ def outline(beam, points, plane, turn, tolerance):
     for (a, b, c), (d, e, f) in zip(corners, corners[1:] + corners[:1]):
         lines.append((sign * (b * f - c * e), sign * (c * d - a * f), sign * (a * e - b * d)))
     for limit in (beam.start, beam.end):
-        heights = [height(limit, p) for p in points]
-        if max(heights) <= tolerance:
+        side = sides_of(limit, points)
+        if max(side) <= 0:
             return [], []
-        if min(heights) < -tolerance:
+        if min(side) < 0:
             own = [sum(limit[k] * beam.back[k][c] for k in range(4)) for c in range(4)]
             near = beam.nearness(plane)
             lines.append(tuple(own[c] + own[2] * n for c, n in zip((0, 1, 3), near)))

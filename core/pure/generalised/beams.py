@@ -11,6 +11,7 @@ from ..directional.second import Handing
 from ..structure import memory_of
 from ..tracing.camera import through
 from ..tracing.surface import Surfaces
+from ..tracing.vectors import add
 from .beam_bsp import Bsp, TooMany
 from .beam_tree import BeamTree
 
@@ -32,7 +33,7 @@ class Beams(Handing):
         most = self.parameters["max_fragments"]
         if self._faces is None:
             check_memory(most)
-            faces = Faces.of(self.scene.objects)
+            faces = Faces.of(self.scene.objects, self.scene.camera.frame()[0])
             try:
                 if len(faces) > most:
                     raise TooMany
@@ -73,11 +74,11 @@ class Beams(Handing):
         own = [f for f in tree.fragments if tree.knows(f.surface)]
         number, ends = {id(f): k for k, f in enumerate(own)}, []
         for f in own:
-            far = [f.beam.at(tree.planes[f.surface], xy) for xy in f.points]
+            far = [add(f.beam.at(tree.planes[f.surface], xy), tree.origin) for xy in f.points]
             if f.beam.parent is None:
                 near = [through(camera, size, *xy)[0] for xy in f.points]
             else:
-                near = [f.beam.parent.at(tree.planes[f.beam.mirror], xy) for xy in f.points]
+                near = [add(f.beam.parent.at(tree.planes[f.beam.mirror], xy), tree.origin) for xy in f.points]
             ends.append((near, far))
         level = [f.level for f in own]
         cells = cells_of(ends, level, [number.get(id(f.source), -1) for f in own])
