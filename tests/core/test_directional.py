@@ -406,3 +406,23 @@ def test_cells_of_the_image_directory_lie_on_the_cameras_frame(core, kind):
     view = scene.camera.frame()[0]
     d = alone - view if kind == "perspective" else np.broadcast_to(scene.camera.frame()[3], alone.shape)
     assert len(alone) > 3 and (np.asarray(index.closest(alone if kind == "orthographic" else np.broadcast_to(view, alone.shape), d).primitive) >= 0).all()
+
+
+@pytest.mark.parametrize("name", [name for k, name in enumerate(BY_NAME) if k % 3 == 1 and name != "empty"])
+def test_lists_name_all_that_a_finer_z_buffer_sees(name):
+    scene = scene_of(name)[0]
+    points = points_of(scene)
+    where = points.mean(axis=0) + 0.3 * np.ptp(points, axis=0)
+    scene = Scene(scene.objects, [Light("lamp", "point", (1.0,) * 3, position=tuple(where.tolist())), LIGHTS["sun"]])
+    for more in ({"resolution": 9}, {"z_buffer": True, "resolution": 9}, {"faces": "adaptive"}):
+        index = build(scene, "light-buffer", **more)
+        index.cells()
+        seen = 0
+        for buffer in index.buffers.values():
+            for lists in buffer.windows():
+                assert not len(lists.unlisted(index.primitives))
+                if lists.grid is not None:
+                    lists.entry = lists.entry[:0]
+                    lists.start = np.zeros_like(lists.start)
+                    seen += len(lists.unlisted(index.primitives))
+        assert seen

@@ -95,7 +95,7 @@ class LightBuffer(Handing):
             return super().cells()
         parts = []
         for number in range(min(len(self.lights), LIGHTS_TRIED)):
-            parts += self.buffer(number).quads(SHOWN * self.extra)
+            parts += [window.quads(SHOWN * self.extra) for window in self.buffer(number).windows()]
             self._make_room(number)
         return joined(parts)
 
@@ -144,9 +144,9 @@ class _Point:
     def references(self):
         return sum(len(face.entry) for face in self.cube.faces.values())
 
-    def quads(self, half):
-        """The cells of each face, as of :meth:`Lists.quads`."""
-        return [self.cube.face(k).quads(half) for k in range(6)]
+    def windows(self):
+        """The lists of all faces."""
+        return [self.cube.face(k) for k in range(6)]
 
     def test(self, rays, query, which):
         """Test those of the rays `which` that go to the light, as far as lists tell; a mask of them."""
@@ -202,12 +202,12 @@ class _Sun:
     def references(self):
         return len(self.lists.entry) if self.lists else 0
 
-    def quads(self, half):
-        """The cells of the window, as of :meth:`Lists.quads`."""
+    def windows(self):
+        """The lists, in a list."""
         if not self.view.usable:
             return []
         self.lists = self.lists or self._make()
-        return [self.lists.quads(half)]
+        return [self.lists]
 
     def test(self, rays, query, which):
         """Test those of the rays `which` that go to the sun, as far as lists tell; a mask of them."""

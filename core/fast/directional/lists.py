@@ -230,6 +230,35 @@ class Lists(Listed):
         self.start = np.concatenate([[0], np.cumsum(np.bincount(cell.take(kept), minlength=len(u)))])
         self.nbytes = feet.nbytes + self.entry.nbytes + self.start.nbytes + self.covered.nbytes
 
+    def unlisted(self, primitives, z_buffer=None, finer=4):
+        """Primitives that a finer z-buffer sees through cells that do not list them: none, if lists are conservative.
+
+        Parameters
+        ----------
+        primitives : Primitives
+        z_buffer : callable, optional
+            As of the constructor; by default that of footprints.
+        finer : int
+            Samples along each side of a cell.
+
+        Returns
+        -------
+        ndarray
+            Numbers of the primitives.
+        """
+        if self.grid is None:
+            return np.zeros(0, np.int64)
+        coarse = Grid.over(64, 64) if isinstance(self.grid, Quadtree) else self.grid
+        lo_u, lo_v = coarse.u0 - 0.5 * coarse.du, coarse.v0 - 0.5 * coarse.dv
+        fine = Grid.over(coarse.columns * finer, coarse.rows * finer, lo_u, lo_u + coarse.columns * coarse.du, lo_v, lo_v + coarse.rows * coarse.dv)
+        item = (z_buffer or centre_buffer)(self.view, fine, primitives, self.feet)
+        seen = np.flatnonzero(item >= 0)
+        foot_of = np.full(primitives.n, -1)
+        foot_of[self.feet.item] = np.arange(len(self.feet))
+        cell = self.cell(*(w[seen] for w in fine.centres()))
+        listed = np.repeat(np.arange(len(self.start) - 1), np.diff(self.start)) * len(self.feet) + self.entry
+        return item[seen[~np.isin(cell * len(self.feet) + foot_of[item[seen]], listed)]]
+
     def quads(self, z):
         """The cells in place, at a distance `z`: corners, level, count, leaf, parent, covered, as of :meth:`Cells.quads`."""
         count = np.diff(self.start)
