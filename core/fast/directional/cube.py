@@ -81,6 +81,6 @@ class Cube:
             return 2 * axis + (along < 0.0), right / depth, up / depth, depth
 
 
-def ends(low, nearest):
-    """A primitive that covers a cell in front of the light, and does not reach to the light itself, is a full occluder."""
-    return (low > 0.0) & (nearest < np.inf)
+def ends(low, high):
+    """A primitive that covers a cell in front of the light, and does not reach to the light there, is a full occluder."""
+    return (low > 0.0) & (high < np.inf)

@@ -42,11 +42,11 @@ class ImageDirectory(Handing):
         from .quadtree import MAX_DEPTH, Quadtree
         near = float(self.scene.camera.near)
 
-        def occludes(low, nearest):
+        def occludes(low, high):
             # Between the near plane and infinity.
             if self.view.perspective:
-                return (low > 0.0) & ((near <= 0.0) | (nearest < (1.0 - LOSS) / (near or 1.0)))
-            return nearest < -near - LOSS * abs(near)
+                return (low > 0.0) & ((near <= 0.0) | (high < (1.0 - LOSS) / (near or 1.0)))
+            return high < -near - LOSS * abs(near)
 
         tree = Quadtree(self.view, self.primitives, self.feet, MAX_DEPTH, occludes)
         return Cells.quads(self.view.corners(tree.area, float(self.view.perspective)), tree.level, np.diff(tree.start), tree.child < 0,

@@ -220,7 +220,8 @@ class Lists(Listed):
         foot = foot_of[proposed[cell]]
         u, v = grid.centres()
         low = Covers.of(self.view, primitives, feet.item[foot]).least(np.arange(len(foot)), u[cell], v[cell], grid.half_u, grid.half_v)
-        sure = np.flatnonzero((low > -np.inf) & occludes(low, feet.nearest.take(foot)))
+        high = nearness_in(feet, foot, u[cell], v[cell], grid.half_u, grid.half_v)
+        sure = np.flatnonzero((low > -np.inf) & occludes(low, high))
         hidden = np.full(len(u), -np.inf)
         hidden[cell[sure]], self.covered[cell[sure]] = low[sure], foot[sure]
         cell = np.repeat(np.arange(len(u)), np.diff(self.start))
@@ -277,7 +278,7 @@ class Lists(Listed):
         return np.zeros(len(u), np.int64) if self.grid is None else self.grid.cell(u, v)
 
 
-def always(low, nearest):
+def always(low, high):
     """Whatever covers a cell ends all rays there."""
     return np.ones(len(low), bool)
 

@@ -56,7 +56,7 @@ class Quadtree:
             half = 0.5 * (area[0, 1] - area[0, 0])
             low = covers.least(foot, u.take(cell), v.take(cell), half, half)
             high = nearness(feet, foot, u.take(cell), v.take(cell), half, half)
-            kept, covered = cut(cell, foot, np.where(occludes(low, feet.nearest.take(foot)), low, -np.inf), high, len(area))
+            kept, covered = cut(cell, foot, np.where(occludes(low, high), low, -np.inf), high, len(area))
             cell, foot = cell.take(kept), foot.take(kept)
             count = np.bincount(cell, minlength=len(area))
             divided = (count > LEAF_SIZE) & (level < max_depth)
