@@ -3,8 +3,12 @@
 Published by V. Havran and F. Sixta, Comparison of Hierarchical Grids, Ray Tracing News 12(1), 1999: 513 x 513 rays through
 the corners of pixels; every hit sends a shadow ray to each light on the side of its geometric normal, a reflected ray where
 Ks > 0 or T > 0, and a refracted one where T > 0, down to four bounces. They traced the databases as printed, with six
-digits. The paper does not say all of its rules: these are the ones that come nearest to its numbers. What they do not
-explain is how many shadow rays are blocked among the glass gears.
+digits. The paper does not say all of its rules: these were found by trying, as the ones that come nearest to its numbers.
+
+One of them is a guess at how his program worked. A shadow ray that leaves a polygon on the side that the viewer's ray did
+not come from (from within a glass gear, to a light outside) counts as blocked, as if it began a little before the polygon;
+of spheres it does not. Without it a fifth of the blocked shadow rays is missing among the gears; with it all numbers of all
+scenes are within 9 %.
 """
 
 import numpy as np
@@ -55,6 +59,7 @@ def numbers_of_rays(scene):
     index = build(scene, "bvh")
     obj, = scene.objects
     slot = np.array([s.slot for s in obj.geometry.solids])
+    flat = np.array([s.kind in ("polygon", "triangle") for s in obj.geometry.solids])
     reflects, refracts, ior = (np.array([getattr(m, name) for m in obj.materials]) for name in ("mirror", "transmission", "ior"))
     y, x = np.mgrid[0:513, 0:513]
     o, d = scene.camera.rays(x.ravel(), y.ravel(), (512, 512))
@@ -65,13 +70,14 @@ def numbers_of_rays(scene):
         if not bounce:
             primary = np.count_nonzero(met)
         p, normal, d, material = hits.point[met], hits.normal[met], d[met], slot[hits.primitive[met]]
+        behind = flat[hits.primitive[met]] & ((normal * d).sum(axis=1) > 0.0)
         for light in scene.lights:
             to = np.array(light.position) - p
             distance = np.linalg.norm(to, axis=1)
             to /= distance[:, None]
             facing = (normal * to).sum(axis=1) > 0.0
             shadow += np.count_nonzero(facing)
-            blocked += np.count_nonzero(index.occluded(p[facing], to[facing], t_min=START, t_max=distance[facing]))
+            blocked += np.count_nonzero(behind[facing] | index.occluded(p[facing], to[facing], t_min=START, t_max=distance[facing]))
         if bounce == BOUNCES:
             break
         d = d / np.linalg.norm(d, axis=1, keepdims=True)
@@ -97,5 +103,5 @@ def numbers_of_rays(scene):
 def test_rays_as_published(name, tmp_path):
     found = numbers_of_rays(as_printed(spd(name), tmp_path / f"{name}.nff"))
     assert abs(found[0] - PUBLISHED[name][0]) <= 2
-    for own, published, blocked in zip(found[1:], PUBLISHED[name][1:], (False, True, False)):
-        assert own == pytest.approx(published, rel=0.25 if blocked and name == "gears" else 0.1)
+    for own, published in zip(found[1:], PUBLISHED[name][1:]):
+        assert own == pytest.approx(published, rel=0.1)
