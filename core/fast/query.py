@@ -57,11 +57,18 @@ class Closest:
         self.detail = np.zeros(rays.n, np.int64)
 
     def test(self, ray, item):
-        """Test pairs of rays and primitives (numbers in the batch, numbers in the set); keep the nearest hits."""
+        """Test pairs of rays and primitives (numbers in the batch, numbers in the set); keep the nearest hits.
+
+        Returns
+        -------
+        ndarray
+            The pairs whose rays may have been shortened.
+        """
         if self.counts:
             self.counts.tests(ray)
         pair, t, u, v, detail = self.primitives.intersect(self.rays, ray, item, self.t, self.counts)
-        self.keep(ray[pair], item[pair], t, u, v, detail)
+        self.keep(ray.take(pair), item.take(pair), t, u, v, detail)
+        return pair
 
     def keep(self, ray, item, t, u, v, detail):
         """Take over hits found elsewhere; several may belong to one ray."""
@@ -103,11 +110,12 @@ class Occluded:
         self.blocked = np.zeros(rays.n, bool)
 
     def test(self, ray, item):
-        """Test pairs of rays and primitives."""
+        """Test pairs of rays and primitives; returns those that hit."""
         if self.counts:
             self.counts.tests(ray)
         pair = self.primitives.blocks(self.rays, ray, item, self.t, self.counts)
-        self.keep(ray[pair])
+        self.keep(ray.take(pair))
+        return pair
 
     def keep(self, ray, *_):
         """These rays are blocked."""

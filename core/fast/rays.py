@@ -4,6 +4,9 @@ from functools import cached_property
 
 import numpy as np
 
+#: kx, ky, kz for each main axis, then for each that the ray runs against.
+AXES = np.array([[1, 2, 0, 2, 0, 1], [2, 0, 1, 1, 2, 0], [0, 1, 2, 0, 1, 2]])
+
 
 class Rays:
     """n rays, checked and scaled for tracing.
@@ -19,6 +22,8 @@ class Rays:
     t_min, t_max : ndarray, shape (n,)
     exponent : ndarray, shape (n,), int
         The scaled direction times 2**exponent is the caller's.
+    prepared
+        What a structure that is asked found out about the rays when it divided them.
     leaving : ndarray, shape (2, n), int, or None
         Object and primitive that each ray leaves, where that is known; -1 for none.
     """
@@ -26,6 +31,7 @@ class Rays:
     def __init__(self, o, d, t_min, t_max, exponent, leaving=None):
         self.n = o.shape[1]
         self.o, self.d, self.t_min, self.t_max, self.exponent, self.leaving = o, d, t_min, t_max, exponent, leaving
+        self.prepared = None
 
     @classmethod
     def checked(cls, origins, directions, t_min, t_max):
@@ -66,12 +72,11 @@ class Rays:
 
     def take(self, index):
         """Some of the rays; `index` is an array or a slice."""
-        if isinstance(index, slice):
-            o, d = self.o[:, index], self.d[:, index]
-        else:
-            o, d = _taken(self.o, index), _taken(self.d, index)
+        columns = self.t_min, self.t_max, self.exponent
         leaving = None if self.leaving is None else self.leaving[:, index]
-        return Rays(o, d, self.t_min[index], self.t_max[index], self.exponent[index], leaving)
+        if isinstance(index, slice):
+            return Rays(self.o[:, index], self.d[:, index], *(c[index] for c in columns), leaving)
+        return Rays(_taken(self.o, index), _taken(self.d, index), *(c.take(index) for c in columns), leaving)
 
     def callers_t(self, t):
         """t in multiples of the caller's directions."""
@@ -90,19 +95,21 @@ class Rays:
         return np.stack([o[1] * d[2] - o[2] * d[1], o[2] * d[0] - o[0] * d[2], o[0] * d[1] - o[1] * d[0]])
 
     @cached_property
+    def main_axis(self):
+        """The direction's largest component, shape (n,); the last of two, but the first of three that are equal."""
+        x, y, z = np.abs(self.d)
+        return np.where(z > np.maximum(x, y), 2, (y > x).astype(np.int64))
+
+    @cached_property
     def main(self):
         """The axes kx, ky, kz of :attr:`shear` where they are the same for all rays, else None."""
-        if not self.n:
+        if not self.n or (self.main_axis != self.main_axis[0]).any():
             return None
-        d = self.d[:, 0]
-        kz = int(np.abs(d).argmax())
-        # Of equal components the one that `shear` takes.
-        others = [np.abs(self.d[axis]).max() for axis in range(3) if axis != kz]
-        sign = self.d[kz] if d[kz] > 0.0 else -self.d[kz]
-        if not sign.min() > max(others):
+        kz = int(self.main_axis[0])
+        against = np.signbit(self.d[kz])
+        if (against != against[0]).any():
             return None
-        kx, ky = (kz + 1) % 3, (kz + 2) % 3
-        return (ky, kx, kz) if d[kz] < 0.0 else (kx, ky, kz)
+        return tuple(AXES[:, kz + 3 * int(against[0])].tolist())
 
     @cached_property
     def shear(self):
@@ -122,17 +129,12 @@ class Rays:
             inverse = 1.0 / self.d[kz]
             s = np.stack([self.d[kx] / self.d[kz], self.d[ky] / self.d[kz], inverse])
             return np.broadcast_to(np.array(self.main)[:, None], (3, self.n)), self.o[list(self.main)], s
-        x, y, z = np.abs(self.d)
-        kz = np.where(z > np.maximum(x, y), 2, (y > x).astype(np.int64))
+        kz = self.main_axis
         i = np.arange(self.n)
         flat = np.ascontiguousarray(self.d).ravel()
         dz = flat.take(kz * self.n + i)
-        turn = dz < 0.0
         # The next axis and the one after; the other way round where the ray runs against its main axis.
-        kx, ky = kz + 1 + turn, kz + 2 - turn
-        kx[kx > 2] -= 3
-        ky[ky > 2] -= 3
-        axes = np.stack([kx, ky, kz])
+        axes = AXES.take(kz + 3 * (dz < 0.0), axis=1)
         place = axes * self.n + i
         s = np.stack([flat.take(place[0]) / dz, flat.take(place[1]) / dz, 1.0 / dz])
         return axes, np.ascontiguousarray(self.o).ravel().take(place), s
@@ -140,7 +142,10 @@ class Rays:
 
 def _taken(columns, index):
     """Some of the columns; row by row, which is several times faster than along axis 1 at once."""
-    return np.stack([row.take(index) for row in columns])
+    out = np.empty((len(columns), len(index)))
+    for row, own in zip(columns, out):
+        row.take(index, out=own, mode="clip")
+    return out
 
 
 def _columns(points, what):

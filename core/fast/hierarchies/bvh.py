@@ -39,8 +39,21 @@ class BVH(VolumeStructure):
     def traverse(self, rays, query):
         if self.wide is None:
             super().traverse(rays, query)
+        elif rays.prepared is not None:
+            wide.traverse(self.wide, rays.prepared, query)
         else:
-            wide.traverse(self.wide, self.frame, rays, query)
+            for some, unit in wide.runs(self.frame, rays):
+                wide.traverse(self.wide, unit, query, some)
+
+    def divide(self, rays):
+        if self.wide is None:
+            return super().divide(rays)
+        parts = []
+        for some, unit in wide.runs(self.frame, rays):
+            part = rays.take(some)
+            part.prepared = unit
+            parts.append((some, part))
+        return parts
 
     def refit_volumes(self):
         if self.wide is None:

@@ -10,7 +10,7 @@ import numpy as np
 
 from .slabs import four, meet
 
-#: Rays of a packet, the largest first; each is a multiple of the next.
+#: Rays of a packet, the largest first; powers of two.
 PACKETS = (64, 16)
 #: Packets are broken up where the next level of the tree has so many more nodes for each of them: a ray, too, meets about
 #: one node a level, and what is met by the packet only costs all of its rays one more.
@@ -43,16 +43,16 @@ def descend(tree, unit, near, far, limit, alive, room):
         return alive, np.zeros(len(alive), np.int64), np.zeros(len(alive), np.float32)
     packet = node = np.zeros(1, np.int64)
     entry = np.zeros(1, np.float32)
-    # One packet of all rays stands for the beginning.
-    rays = -(-len(alive) // PACKETS[0]) * PACKETS[0]
     for size, bounds in zip(PACKETS, _bounds(unit, limit, alive)):
-        packet, node, entry = _divide(packet, node, entry, rays // size, len(bounds[-1]))
-        packet, node, entry = _down(tree, near, far, bounds, packet, node, entry, room)
-        rays = size
+        # All packets of the largest size begin at the root; smaller ones go on where theirs was broken up.
+        parts = len(bounds[-1]) if size == PACKETS[0] else previous // size
+        packet = (packet[:, None] * parts + np.arange(parts)).ravel()
+        packet, node, entry = _down(tree, near, far, bounds, packet, np.repeat(node, parts), np.repeat(entry, parts), room)
+        previous = size
     order = np.argsort(-entry, kind="stable")
     packet, node, entry = packet[order], node[order], entry[order]
     start = packet * size
-    n = np.minimum(start + size, len(alive)) - start
+    n = np.clip(len(alive) - start, 0, size)
     ends = np.cumsum(n)
     place = np.repeat(start - (ends - n), n) + np.arange(ends[-1] if len(ends) else 0)
     return alive[place], np.repeat(node, n), np.repeat(entry, n)
@@ -60,22 +60,18 @@ def descend(tree, unit, near, far, limit, alive, room):
 
 def _bounds(unit, limit, alive):
     """For each size of packets their least and greatest origins and reciprocals (6 arrays each), and greatest limits."""
-    values = [line.take(alive).view(np.float32)[::4] for line in unit.lines]
-    least = most = values
+    # The last packet is filled up with its last ray.
+    alive = np.concatenate([alive, np.repeat(alive[-1:], -len(alive) % PACKETS[0])])
+    least = most = [values.take(alive) for values in unit.values]
     reach, previous, found = limit.take(alive), 1, []
     for size in reversed(PACKETS):
-        start = np.arange(0, len(reach), size // previous)
-        least, most = [np.minimum.reduceat(v, start) for v in least], [np.maximum.reduceat(v, start) for v in most]
-        reach, previous = np.maximum.reduceat(reach, start), size
+        # Halved again and again: many times faster than one reduction a packet.
+        for _ in range((size // previous).bit_length() - 1):
+            least, most = [np.minimum(v[::2], v[1::2]) for v in least], [np.maximum(v[::2], v[1::2]) for v in most]
+            reach = np.maximum(reach[::2], reach[1::2])
+        previous = size
         found.append((least, most, reach))
     return found[::-1]
-
-
-def _divide(packet, node, entry, parts, n):
-    """Packets divided into as many parts each; there are n in all."""
-    packet = (packet[:, None] * parts + np.arange(parts)).ravel()
-    used = np.flatnonzero(packet < n)
-    return packet[used], np.repeat(node, parts)[used], np.repeat(entry, parts)[used]
 
 
 def _down(tree, near, far, bounds, packet, node, entry, room):

@@ -26,6 +26,14 @@ LEAVES = 8_192
 #: Levels of the packed tree at which a ray's nearest child is taken up before the others. Measured: below, finding the
 #: nearest costs more than it saves, because boxes are small and a whole chunk is done before the next.
 ORDERED_LEVELS = 3
+#: Children that a ray meets on average, below which there is little to be put in order.
+ORDERED_CHILDREN = 1.25
+
+#: A run of so many rays is divided by the main axes of their directions, for the triangle test.
+LONG = 2 * CHUNK
+
+#: What spread makes of all numbers of 11 bits.
+SPREAD = spread(np.arange(2048, dtype=np.uint64))
 
 
 class WideTree:
@@ -90,33 +98,73 @@ def _collapse(tree):
 
 
 class UnitRays:
-    """Rays of one octant in unit space, four times over, starting where they enter the scene, in `order`.
+    """Rays of one octant in unit space, four times over, starting where they enter the scene.
 
-    A component smaller than `TINY` is taken to be `TINY`: over the scene's extent that moves the ray by far less than
-    `PAD`, and no reciprocal is infinite.
+    Attributes
+    ----------
+    octant : int
+        Bit k says that component k of the directions is negative.
+    start, end : ndarray, shape (n,)
+        Where the rays enter and leave the scene.
+    size : float
+        Of a unit, in the rays' space.
+    values, lines : list of 6 ndarray
+        x, y, z of origins, then of reciprocals, once, and four times over. The far end is kept apart, since it changes.
     """
 
-    def __init__(self, frame, rays):
-        d = np.where(np.abs(rays.d) < TINY, np.copysign(TINY, rays.d), rays.d)
-        o = (rays.o - frame.centre[:, None]) / frame.size
-        inverse = 1.0 / d
-        edge = 1.0 + 4 * PAD
-        near = (-np.copysign(edge, d) - o) * inverse
-        far = (np.copysign(edge, d) - o) * inverse
-        t_min = rays.t_min / frame.size
-        self.start = np.maximum(near.max(axis=0), t_min)
-        self.end = far.min(axis=0)
-        self.size = frame.size
-        o += self.start * rays.d
-        order = self.order = along_curve(o)
-        o, inverse, self.start, self.end = o.take(order, axis=1), inverse.take(order, axis=1), self.start[order], self.end[order]
-        #: Lines of x, y, z origins, then reciprocals; the far end is kept apart, since it changes.
-        self.lines = [four(a) for a in (*o, *inverse)]
+    def __init__(self, octant, start, end, size, values):
+        self.octant, self.start, self.end, self.size, self.values = octant, start, end, size, values
+        self.lines = [four(column) for column in values]
 
     def limit(self, t, ray=slice(None)):
         """Distances t of some rays as float32 distances from their starts, rounded up."""
         with np.errstate(over="ignore"):
             return ((t / self.size - self.start[ray]) * (1.0 + 2.0**-20) + 2.0**-40).astype(np.float32)
+
+
+def runs(frame, rays):
+    """Divide rays into runs that are traced together, each along a curve through its rays' origins.
+
+    A component smaller than `TINY` is taken to be `TINY`: over the scene's extent that moves the ray by far less than
+    `PAD`, and no reciprocal is infinite.
+
+    Returns
+    -------
+    list of (ndarray, UnitRays)
+        The rays' numbers, in order; the directions of a run have the same signs, and those of a long one the same main axis.
+    """
+    start, end, columns = np.empty(rays.n), np.empty(rays.n), np.empty((6, rays.n), np.float32)
+    for first in range(0, rays.n, CHUNK):
+        some = slice(first, first + CHUNK)
+        start[some], end[some] = _enter(frame, rays.o[:, some], rays.d[:, some], rays.t_min[some], columns[:, some])
+    # By the sign bit: the reciprocal of -0.0 counts as negative, too.
+    sign = np.signbit(rays.d)
+    octant = sign[0] + 2 * sign[1] + 4 * sign[2]
+    order = along_curve(columns[:3])
+    octant_there, found = octant.take(order), []
+    for k in np.flatnonzero(np.bincount(octant, minlength=8)):
+        run = order.take(np.flatnonzero(octant_there == k))
+        parts = [run]
+        if len(run) >= LONG:
+            axis = rays.main_axis.take(run)
+            parts = [run.take(np.flatnonzero(axis == a)) for a in range(3)]
+        found += [(part, UnitRays(int(k), start.take(part), end.take(part), frame.size, [c.take(part) for c in columns]))
+                  for part in parts if len(part)]
+    return found
+
+
+def _enter(frame, o, d, t_min, out):
+    """Where rays enter and leave the scene; their origins there and reciprocals go into `out`."""
+    if np.abs(d).min(initial=1.0) < TINY:
+        d = np.where(np.abs(d) < TINY, np.copysign(TINY, d), d)
+    o = (o - frame.centre[:, None]) / frame.size
+    inverse = 1.0 / d
+    edge = np.copysign(1.0 + 4 * PAD, d)
+    near, far = (-edge - o) * inverse, (edge - o) * inverse
+    start = np.maximum(near.max(axis=0), t_min / frame.size)
+    o += start * d
+    out[:3], out[3:] = o, inverse
+    return start, far.min(axis=0)
 
 
 def along_curve(o):
@@ -127,50 +175,47 @@ def along_curve(o):
     code = np.zeros(o.shape[1], np.uint64)
     for axis in range(3):
         # fmin and fmax also take NaN, the origins of rays that come from too far away to meet anything, to a cell.
-        cell = np.fmin(np.fmax(o[axis] * 1023.5 + 1023.5, 0.0), 2047.0).astype(np.uint64)
-        code |= spread(cell) << np.uint64(2 - axis)
+        cell = np.fmin(np.fmax(o[axis] * 1023.5 + 1023.5, 0.0), 2047.0).astype(np.int64)
+        code |= SPREAD.take(cell) << np.uint64(2 - axis)
     code <<= np.uint64(31)
     code |= np.arange(o.shape[1], dtype=np.uint64)
     code.sort()
     return (code & np.uint64(2**31 - 1)).astype(np.int64)
 
 
-def traverse(tree, frame, rays, query):
-    """Find the leaves that rays meet and hand their primitives to the query."""
-    # By the sign bit: the reciprocal of -0.0 counts as negative, too.
-    sign = np.signbit(rays.d)
-    octant = sign[0] + 2 * sign[1] + 4 * sign[2]
-    room = Room()
-    for o in np.flatnonzero(np.bincount(octant, minlength=8)):
-        _Octant(tree, frame, rays, query, np.flatnonzero(octant == o), int(o), room).run()
+def traverse(tree, unit, query, number=None):
+    """Find the leaves that a run of rays meets and hand their primitives to the query; `number` are the rays' there."""
+    _Traversal(tree, unit, query, number).run()
 
 
-class _Octant:
+class _Traversal:
     """The traversal of rays whose directions have the same signs, so that near and far planes are known beforehand.
 
     Pairs wait in one list a level. The next chunk is taken from the deepest list that has a fair number, and the nearer
     children are put on top of it: so the traversal goes front to back, roughly, without small arrays.
     """
 
-    def __init__(self, tree, frame, rays, query, index, octant, room):
-        self.tree, self.query, self.room = tree, query, room
-        unit = UnitRays(frame, rays.take(index))
-        index = index[unit.order]
-        alive = np.flatnonzero((unit.start <= unit.end) & (unit.start * frame.size <= query.t[index]))
-        self.index, self.unit = index, unit
-        signs = [octant >> a & 1 for a in range(3)]
+    def __init__(self, tree, unit, query, number):
+        self.tree, self.unit, self.query, self.number, self.room = tree, unit, query, number, Room()
+        t = query.t if number is None else query.t.take(number)
+        self.limit = unit.limit(t)
+        self.limit4 = four(self.limit)
+        alive = np.flatnonzero((unit.start <= unit.end) & (unit.start * unit.size <= t))
+        signs = [unit.octant >> a & 1 for a in range(3)]
         self.near = [a + 3 * s for a, s in enumerate(signs)]
         self.far = [a + 3 - 3 * s for a, s in enumerate(signs)]
-        self.limit = unit.limit(query.t[index])
-        self.limit4 = four(self.limit)
         self.planes = [(o, o, reciprocal, reciprocal) for o, reciprocal in zip(unit.lines[:3], unit.lines[3:])]
         # Counts are those of each ray by itself; what packets share would depend on the order of the rays.
         if query.counts is None:
-            pairs = descend(tree, unit, self.near, self.far, self.limit, alive, room)
+            pairs = descend(tree, unit, self.near, self.far, self.limit, alive, self.room)
         else:
             pairs = alive, np.zeros(len(alive), np.int64), np.zeros(len(alive), np.float32)
         self.levels = [[pairs]] if len(pairs[0]) else []
         self.leaf_ray, self.leaf_item, self.waiting = [], [], 0
+
+    def there(self, ray):
+        """The rays' numbers in the query."""
+        return ray if self.number is None else self.number.take(ray)
 
     def run(self):
         while self.levels:
@@ -193,7 +238,8 @@ class _Octant:
         if not len(ray):
             return
         if self.query.counts:
-            self.query.counts.steps(self.index[ray])
+            self.query.counts.steps(self.there(ray))
+        pairs = len(ray)
         slot, child, entry = meet(self.tree.lines, node, self.near, self.far, self.planes, ray, self.limit4, self.room)
         ray = ray.take(slot >> 2)
         leaf = np.flatnonzero(child < 0)
@@ -202,13 +248,13 @@ class _Octant:
             inner = np.flatnonzero(child >= 0)
             ray, child, entry = ray.take(inner), child.take(inner), entry.take(inner)
         if len(ray):
-            self.push(level + 1, ray, child.astype(np.int64), entry)
+            self.push(level + 1, ray, child.astype(np.int64), entry, len(ray) > ORDERED_CHILDREN * pairs)
 
-    def push(self, level, ray, node, entry):
-        """Put pairs on a level, at the upper levels with the nearest child of every ray on top."""
+    def push(self, level, ray, node, entry, several):
+        """Put pairs on a level, at the upper levels with the nearest child of every ray on top if there are several."""
         if level == len(self.levels):
             self.levels.append([])
-        if level > ORDERED_LEVELS:
+        if level > ORDERED_LEVELS or not several:
             self.levels[level].append((ray, node, entry))
             return
         # Pairs of one ray and parent stand together; the nearest of them is the one with the least entry.
@@ -249,14 +295,15 @@ class _Octant:
         ray, item = np.concatenate(self.leaf_ray), np.concatenate(self.leaf_item).astype(np.int64)
         self.leaf_ray, self.leaf_item, self.waiting = [], [], 0
         if self.query.counts:
-            self.query.counts.steps(self.index[ray])
-            self.query.counts.elementary(self.index[ray])
+            self.query.counts.steps(self.there(ray))
+            self.query.counts.elementary(self.there(ray))
         if self.tree.first is not None:
             first, count = self.tree.first[item], self.tree.count[item]
             ends = np.cumsum(count)
             place = np.repeat(first - (ends - count), count) + np.arange(ends[-1])
             ray, item = np.repeat(ray, count), self.tree.order[place]
-        self.query.test(self.index[ray], item)
-        limit = self.unit.limit(self.query.t[self.index[ray]], ray)
+        hit = self.query.test(self.there(ray), item)
+        ray = ray.take(hit)
+        limit = self.unit.limit(self.query.t.take(self.there(ray)), ray)
         self.limit[ray] = limit
         self.limit4[ray] = four(limit)

@@ -116,3 +116,4 @@ class _All:
         self.ray.append(ray[pair])
         self.item.append(item[pair])
         self.at.append(t)
+        return pair
