@@ -31,7 +31,7 @@ ONCE_SECONDS = 10.0
 EXAMPLES = 5
 
 COLUMNS = ("technique", "core", "T_B", "T_R", "N_IT", "N_TS", "N_ETS", "memory", "differ", "checked", "differ_embree")
-ALL_COLUMNS = ("technique", "core", "kind", "rays", "T_primary", "T_secondary", "T_shadow", *figures.FIGURES,
+ALL_COLUMNS = ("technique", "core", "kind", "resolution", "rays", "T_primary", "T_secondary", "T_shadow", *figures.FIGURES, "list_length",
                "differ", "checked", "differ_embree")
 
 
@@ -168,8 +168,6 @@ def _checked(contestant, index, sets, truths, diagonal, say):
     say(f"{contestant.label} ({contestant.core}): counting")
     row = technique(contestant.name)
     peer = row.family == "peers"
-    result = {"technique": contestant.label, "core": contestant.core, "kind": "peer" if peer else row.family,
-              **{k: v for k, v in index.figures.items() if k in figures.FIGURES}}
     sums, n_rays, n_hits = dict.fromkeys(figures.PER_RAY, 0), 0, 0
     differ, checked, examples = dict.fromkeys(truths, 0), 0, []
     for i, s in enumerate(sets):
@@ -193,6 +191,11 @@ def _checked(contestant, index, sets, truths, diagonal, say):
                 checked += len(some)
                 examples += [{"kind": s.kind, "origin": s.origins[b], "direction": s.directions[b], "t_min": s.t_min, "t_max": s.t_max}
                              for b in bad[:EXAMPLES - len(examples)]]
+    # Only now: some techniques make their lists when rays come.
+    result = {"technique": contestant.label, "core": contestant.core, "kind": "peer" if peer else row.family,
+              "resolution": contestant.parameters.get("resolution"), **{k: v for k, v in index.figures.items() if k in figures.FIGURES}}
+    if result.get("N_E"):
+        result["list_length"] = result["N_ER"] / result["N_E"]
     counted = dict.fromkeys(("N_IT", "N_TS", "N_ETS", "N_EETS", "r_ITM")) if peer else figures.ray_figures(**sums, n_rays=n_rays, n_hits=n_hits)
     return {**result, **counted, "rays": n_rays, "differ": differ["brute"], "checked": checked, "differ_embree": differ.get("embree"),
             "examples": examples}
@@ -282,9 +285,17 @@ def write(result, folder, title):
                 ("counts.png", lambda path: report.scatter(path, [(n, r["N_TS"], r["N_IT"]) for n, r in zip(names, rows)],
                                                            "N_TS: traversal steps per ray", "N_IT: intersection tests per ray", title)),
                 ("memory.png", lambda path: report.bars(path, [(n, r["memory"] / 1e6) for n, r in zip(names, rows) if r.get("memory")],
-                                                        "memory of the structure, MB", title))):
+                                                        "memory of the structure, MB", title)),
+                ("lists.png", lambda path: _against_resolution(path, names, rows, "list_length", "primitives a cell lists", title)),
+                ("tests.png", lambda path: _against_resolution(path, names, rows, "N_IT", "N_IT: intersection tests per ray", title))):
             if drawn(folder / file):
                 files.append(folder / file)
     except MissingPackageError as error:
         return files, str(error)
     return files, ""
+
+
+def _against_resolution(path, names, rows, figure, label, title):
+    """Plot a figure of the techniques that were given a resolution; whether there were several."""
+    points = [(name, row["resolution"], row.get(figure)) for name, row in zip(names, rows) if row["resolution"]]
+    return len(points) > 1 and report.scatter(path, points, "resolution: cells along an edge", label, title)

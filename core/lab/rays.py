@@ -21,6 +21,8 @@ class RaySet:
         As in the catalogue; shadow rays ask ``occluded``, the others ``closest``.
     origins, directions : ndarray, shape (n, 3)
     t_min, t_max : float
+    leaving : ndarray, shape (2, n), optional
+        Objects and primitives that they leave.
     """
 
     kind: str
@@ -28,17 +30,21 @@ class RaySet:
     directions: np.ndarray
     t_min: float = 0.0
     t_max: float = np.inf
+    leaving: np.ndarray | None = None
 
     def __len__(self):
         return len(self.origins)
 
     def take(self, index):
         """Some of the rays."""
-        return RaySet(self.kind, self.origins[index], self.directions[index], self.t_min, self.t_max)
+        leaving = None if self.leaving is None else self.leaving[:, index]
+        return RaySet(self.kind, self.origins[index], self.directions[index], self.t_min, self.t_max, leaving)
 
     def ask(self, index, **more):
         """Put the rays to a structure: its Hits, or for shadow rays an array of bool."""
         question = index.occluded if self.kind == "shadow" else index.closest
+        if self.leaving is not None and index.follows:
+            more["leaving"] = self.leaving
         return question(self.origins, self.directions, self.t_min, self.t_max, **more)
 
 
@@ -78,14 +84,14 @@ def primary_rays(scene, n, rng):
 
 def bounce_rays(hits, rays, diagonal, n, rng):
     """n cosine-distributed rays off the surfaces that `rays` hit; none where nothing was hit."""
-    start, normal = _starts(hits, rays, diagonal, n, rng)
+    start, normal, leaving = _starts(hits, rays, diagonal, n, rng)
     # A unit normal plus a random unit vector is cosine-distributed about the normal.
-    return RaySet("secondary", start, _unit(normal + _unit(rng.normal(size=start.shape))))
+    return RaySet("secondary", start, _unit(normal + _unit(rng.normal(size=start.shape))), leaving=leaving)
 
 
 def shadow_rays(scene, hits, rays, diagonal, n, rng):
     """n rays from the surfaces that `rays` hit to lights, t_max = 1; to random points of the scene where it has no light."""
-    start, _ = _starts(hits, rays, diagonal, n, rng)
+    start, _, leaving = _starts(hits, rays, diagonal, n, rng)
     lo, hi = scene.bounds()
     if scene.lights:
         target = np.array([light.position for light in scene.lights], float)[rng.integers(len(scene.lights), size=len(start))]
@@ -95,7 +101,7 @@ def shadow_rays(scene, hits, rays, diagonal, n, rng):
                 target[at] = start[at] - 2.0 * diagonal * np.asarray(light.direction, float)
     else:
         target = rng.uniform(lo, hi, start.shape)
-    return RaySet("shadow", start, target - start, t_max=1.0)
+    return RaySet("shadow", start, target - start, t_max=1.0, leaving=leaving)
 
 
 def ray_sets(scene, reference, n, seed):
@@ -124,15 +130,15 @@ def ray_sets(scene, reference, n, seed):
 
 
 def _starts(hits, rays, diagonal, n, rng):
-    """n starting points just off the surfaces hit, and the normals there, on the side that the rays came from."""
+    """n starting points just off the surfaces hit, the normals there, on the side that the rays came from, and what is left."""
     facing = np.flatnonzero(hits.hit & (hits.normal != 0.0).any(axis=1))
     if not len(facing):
-        return np.zeros((0, 3)), np.zeros((0, 3))
+        return np.zeros((0, 3)), np.zeros((0, 3)), np.zeros((2, 0), np.int64)
     pick = facing if n == len(facing) else facing[rng.integers(len(facing), size=n)]
     normal = hits.normal[pick]
     away = (normal * rays.directions[pick]).sum(axis=1) > 0.0
     normal = np.where(away[:, None], -normal, normal)
-    return hits.point[pick] + OFFSET * diagonal * normal, normal
+    return hits.point[pick] + OFFSET * diagonal * normal, normal, np.stack([hits.object[pick], hits.primitive[pick]]).astype(np.int64)
 
 
 def _unit(v):

@@ -33,6 +33,23 @@ def test_rows():
     assert {"rays", "T_primary", "T_secondary", "T_shadow"} <= bvh.keys() <= {*ALL_COLUMNS, "seconds", "examples"}
 
 
+def test_list_lengths_and_tests_against_resolution(tmp_path):
+    """Finer cells have shorter lists and need fewer tests; both are plotted, whatever the technique that has a resolution."""
+    pytest.importorskip("matplotlib")
+    contestants = [Contestant(name, "fast", {"resolution": r}) for name in ("light-buffer", "ray-coherence") for r in (2, 8)]
+    result = compare(room(n=1500), contestants, n_rays=300, repeats=1)
+    assert not result["failed"]
+    for coarse, fine in (result["rows"][:2], result["rows"][2:]):
+        assert (coarse["resolution"], fine["resolution"]) == (2, 8)
+        assert fine["list_length"] < 0.7 * coarse["list_length"] and fine["N_IT"] <= 1.05 * coarse["N_IT"]
+    lists = result["rows"][2]
+    assert lists["N_E"] > 100 and lists["loose"] > 1.0
+    files, _ = lab.write(result, tmp_path, "title")
+    assert {"lists.png", "tests.png"} <= {f.name for f in files}
+    files, _ = lab.write(compare(room(), FEW[:2], n_rays=50, repeats=1), tmp_path / "other", "title")
+    assert not {"lists.png", "tests.png"} & {f.name for f in files}
+
+
 def test_the_seed_chooses_the_rays():
     scene = room()
     a, b, c = (ray_sets(scene, build(scene, "brute"), 50, seed) for seed in (0, 0, 1))

@@ -231,7 +231,7 @@ def test_shadow_rays(name, kind, core):
 def shadow_rays_are_right(light, index, brute, o, d):
     far = math.inf if light.kind == "sun" else 1.0 - 1e-12
     towards = index.for_light(light)
-    for t_min, t_max in ((0.0, far), (0.0, 0.4), (0.5, far)):
+    for t_min, t_max in ((0.0, far), (0.0, 1.0), (0.0, 0.4), (0.5, far)):
         expected = np.asarray(brute.occluded(o, d, t_min, t_max))
         assert np.array_equal(towards.occluded(o, d, t_min, t_max), expected)
         assert np.array_equal(index.occluded(o, d, t_min, t_max), expected)

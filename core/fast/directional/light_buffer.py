@@ -15,7 +15,7 @@ from .lists import LOSS, Lists, centre_buffer
 from .second import Handing
 from .view import View
 
-#: How far beside a light a ray may pass, relative to the largest coordinate; well within the footprints' own rounding.
+#: How far beside a light a ray may pass, or beyond it end, relative to the largest coordinate; well within the footprints' own rounding.
 BESIDE = 2.0**-46
 #: Half the edge of the cubes that are drawn, relative to the scene.
 SHOWN = 0.02
@@ -105,7 +105,8 @@ class LightBuffer(Handing):
             self.buffers.pop(next(iter(self.buffers)))
         used = sum(b.nbytes for b in self.buffers.values())
         second = self._second.figures["memory"] if self._second is not None else 0
-        self.figures.update(N_ER=sum(b.references for b in self.buffers.values()), memory=used + second)
+        counts = np.concatenate([count for b in self.buffers.values() for count in b.counts] or [np.zeros(0, np.int64)])
+        self.figures.update(N_E=len(counts), N_EE=int(np.count_nonzero(counts == 0)), N_ER=int(counts.sum()), memory=used + second)
         if used > self.max_bytes and not any(n.name == self.lights[number].name for n in self.notices):
             self.notices.append(Notice(self.lights[number].name, f"its buffer takes {used} bytes, more than max_bytes = {self.max_bytes:g}, though "
                                        "its resolution was lowered. Raise max_bytes, or name another technique for shadow rays."))
@@ -141,8 +142,9 @@ class _Point:
         return len(self.cube.faces)
 
     @property
-    def references(self):
-        return sum(len(face.entry) for face in self.cube.faces.values())
+    def counts(self):
+        """Entries of each cell."""
+        return [np.diff(face.start) for face in self.cube.faces.values()]
 
     def windows(self):
         """The lists of all faces."""
@@ -157,8 +159,8 @@ class _Point:
             reach = -(w[0] * d[0] + w[1] * d[1] + w[2] * d[2]) / squared
             beside = np.maximum(np.maximum(np.abs(w[0] + reach * d[0]), np.abs(w[1] + reach * d[1])), np.abs(w[2] + reach * d[2]))
             far = np.maximum(np.maximum(np.abs(o[0]), np.abs(o[1])), np.abs(o[2]))
-            own = ((beside <= BESIDE * self.extra) & (far <= self.extra) & (reach > 0.0) & (t_max <= reach) & (t_min >= 0.0)
-                   & (reach * np.sqrt(squared) > 2.0**-30 * self.extra))
+            own = ((beside <= BESIDE * self.extra) & (far <= self.extra) & (reach > 0.0) & (t_min >= 0.0)
+                   & ((t_max - reach) * np.sqrt(squared) <= BESIDE * self.extra) & (reach * np.sqrt(squared) > 2.0**-30 * self.extra))
         if not own.any():
             return own
         if not own.all():
@@ -199,8 +201,9 @@ class _Sun:
         return int(self.lists is not None)
 
     @property
-    def references(self):
-        return len(self.lists.entry) if self.lists else 0
+    def counts(self):
+        """Entries of each cell."""
+        return [np.diff(self.lists.start)] if self.lists else []
 
     def windows(self):
         """The lists, in a list."""

@@ -20,8 +20,10 @@ from .cube import Cube
 from .lists import in_rounds
 from .second import Handing
 
-#: Rounding of rays and of hits, relative to the largest coordinate; spheres are larger by so much.
+#: Rounding, relative.
 ROUNDING = 2.0**-40
+#: Spheres are larger by so much, relative to the largest coordinate: far more than rounding, as rays may start a little off what they leave.
+OFF = 2.0**-15
 #: Nearness lost in single precision, relative.
 LOSS = 2.0**-20
 #: Spheres a node of the tree.
@@ -350,7 +352,7 @@ def _spheres(primitives, lights):
         finite = np.abs(np.concatenate([primitives.lo, primitives.hi]))
         extra = 2.0 * float(np.where(np.isfinite(finite), finite, 0.0).max())
         # A sliver's hits are uncertain along its length.
-        radius = radius + ROUNDING * extra + np.minimum(stretch * 2.0**-46 * extra, reach)
+        radius = radius + OFF * extra + np.minimum(stretch * 2.0**-46 * extra, reach)
     centre[:, bad], radius[bad] = 0.0, np.inf
     places = np.array([light.position for light in lights], float).reshape(-1, 3).T
     sizes = np.array([max(light.radius, sum(float(np.linalg.norm(a)) for a in light.axes or ())) for light in lights], float)

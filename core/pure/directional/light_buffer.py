@@ -15,7 +15,7 @@ from .quadtree import divide, divide_evenly, quads
 from .second import Handing
 from .view import LOSS, View, cross
 
-#: How far beside a light a ray may pass, relative to the largest coordinate; well within the footprints' own rounding.
+#: How far beside a light a ray may pass, or beyond it end, relative to the largest coordinate; well within the footprints' own rounding.
 BESIDE = 2.0**-46
 #: Half the edge of the cubes that are drawn, relative to the scene.
 SHOWN = 0.02
@@ -104,6 +104,9 @@ class LightBuffer(Handing):
         self.bytes[number] = memory_of(*(root for _, root in self.buffers[number].faces.values()))
         while len(self.buffers) > 1 and sum(self.bytes[k] for k in self.buffers) > self.max_bytes:
             self.buffers.pop(next(iter(self.buffers)))
+        leaves = [c for b in self.buffers.values() for _, root in b.faces.values() for c in root.walk() if not c.children]
+        self.figures.update(N_E=len(leaves), N_EE=sum(not c.entries for c in leaves), N_ER=sum(len(c.entries) for c in leaves),
+                            memory=sum(self.bytes[k] for k in self.buffers) + (self._second.figures["memory"] if self._second else 0))
         name = self.lights[number].name
         if self.bytes[number] > self.max_bytes and not any(n.name == name for n in self.notices):
             self.notices.append(Notice(name, f"its buffer takes {self.bytes[number]} bytes, more than max_bytes = {self.max_bytes:g}. "
@@ -155,7 +158,7 @@ class _Point:
         reach = -sum(a * b for a, b in zip(w, ray.d)) / squared
         beside = max(abs(a + reach * b) for a, b in zip(w, ray.d))
         if not (beside <= BESIDE * self.extra and max(map(abs, ray.o)) <= self.extra and reach > 0.0 and 0.0 <= ray.t_min
-                and ray.t_max <= reach and reach * math.sqrt(squared) > 2.0**-30 * self.extra):
+                and (ray.t_max - reach) * math.sqrt(squared) <= BESIDE * self.extra and reach * math.sqrt(squared) > 2.0**-30 * self.extra):
             return None
         return w, reach
 

@@ -19,8 +19,10 @@ from ..structure import memory_of
 from .cube import Cube
 from .second import Handing
 
-#: Rounding of rays and of hits, relative to the largest coordinate; spheres are larger by so much.
+#: Rounding, relative.
 ROUNDING = 2.0**-40
+#: Spheres are larger by so much, relative to the largest coordinate: far more than rounding, as rays may start a little off what they leave.
+OFF = 2.0**-15
 #: Bytes of an entry, about.
 ENTRY = 112
 
@@ -211,7 +213,7 @@ def _sphere(primitive, extra):
     except (OverflowError, ZeroDivisionError):
         return (0.0, 0.0, 0.0), math.inf
     # A sliver's hits are uncertain along its length.
-    radius = sphere.radius + ROUNDING * extra + min(sphere.margin.stretch * 2.0**-46 * extra, sphere.margin.reach)
+    radius = sphere.radius + OFF * extra + min(sphere.margin.stretch * 2.0**-46 * extra, sphere.margin.reach)
     if not (math.isfinite(radius) and all(map(math.isfinite, sphere.centre))):
         return (0.0, 0.0, 0.0), math.inf
     return tuple(sphere.centre), radius
