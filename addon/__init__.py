@@ -4,8 +4,8 @@
 def _parts():
     """In the order of registration: operators and panels use the properties, and panels name the engine."""
     from . import command, engine
-    from .ui import add, error, findings, handlers, operators, outlines, panels, primitives, properties
-    return properties, primitives, engine, operators, add, panels, findings, error, handlers, outlines, command
+    from .ui import add, error, findings, handlers, operators, outlines, panels, point, primitives, properties
+    return properties, primitives, engine, operators, point, add, panels, findings, error, handlers, outlines, command
 
 
 def register():

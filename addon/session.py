@@ -20,6 +20,8 @@ class Built:
         Objects in Blender's scene at the time.
     stale : bool
         Whether Blender's scene has changed since.
+    pointed : int
+        The cell that is pointed at, -1 for none.
     number : int
         Different for every build.
     ends : dict
@@ -31,6 +33,7 @@ class Built:
     cells: object
     n_objects: int
     stale: bool = False
+    pointed: int = -1
     number: int = field(default_factory=lambda: next(_numbers))
     ends: dict = field(default_factory=dict)
 

@@ -79,13 +79,19 @@ class Cells:
     parent : int64
         Index of the cell above, -1 at the root.
     volume : str
-        What the cells really are: "box", or "sphere", "obb", "kdop", "quad"; lo and hi are then the boxes of what they hold.
+        What the cells really are: "box", or "sphere", "obb", "kdop", "quad", "slab", "polygon"; lo and hi are then the boxes of what
+        they hold.
     shape : float64, shape (c, p), or None
         Of other volumes than boxes. sphere: centre, radius. obb: three unit axes, low ends along them, high ends. kdop: low
         ends along the directions of :data:`KDOP_AXES`, then high ends. quad: the corners of a parallelogram, those that follow each
-        other share a side except the middle two.
+        other share a side except the middle two. polygon: the corners of that part of a cell's plane that divides it, filled up with
+        the last one; all the same where a cell is not divided.
     covered : bool, or None
         Of directional techniques: whether one primitive covers the whole cell, a full occluder.
+    code : int64, or None
+        Of an octree of leaves alone: the cells' names, Glassner's digits.
+    group : int64, or None
+        What cells have in common: the number of the list that they share (-1: none), or the axis across which slabs lie.
     """
 
     lo: np.ndarray
@@ -98,6 +104,8 @@ class Cells:
     volume: str = "box"
     shape: np.ndarray | None = None
     covered: np.ndarray | None = None
+    code: np.ndarray | None = None
+    group: np.ndarray | None = None
 
     def __len__(self):
         return len(self.lo)

@@ -13,18 +13,19 @@ VERTEX = """
 void main()
 {
   int i = gl_InstanceID * texels;
-  int corner = int(pos.y * 2.0 + pos.z);
-  vec4 a = texelFetch(boxes, ivec2((texels == 5 ? i + corner : i) % row, i / row), 0);
+  int corner = texels == 13 ? (gl_VertexID / 2 + gl_VertexID % 2) % 12 : int(pos.y * 2.0 + pos.z);
+  vec4 a = texelFetch(boxes, ivec2((texels > 3 ? i + corner : i) % row, i / row), 0);
   vec4 b = texelFetch(boxes, ivec2((i + 1) % row, i / row), 0);
   colour = texelFetch(boxes, ivec2((i + texels - 1) % row, i / row), 0);
-  gl_Position = projection * vec4(texels == 5 ? a.xyz : mix(a.xyz, b.xyz, pos), 1.0);
+  gl_Position = projection * vec4(texels > 3 ? a.xyz : mix(a.xyz, b.xyz, pos), 1.0);
 }
 """
 FRAGMENT = "void main() { result = colour; }"
 
 
 class Boxes:
-    """Cells on the graphics card: boxes, or flat cells, each drawn by the edges of a box of which those along x have no length.
+    """Cells on the graphics card: boxes; flat cells, each drawn by the edges of a box of which those along x have no length; or
+    pieces of planes, of which each edge of a box draws one side.
 
     Parameters
     ----------
@@ -90,9 +91,10 @@ def _shader_and_edges():
 
 def draw_in_view(built, overlay):
     """Draw what was built into the 3D view that is being drawn, with these settings."""
-    signature = (built.number, overlay.signature())
+    signature = (built.number, overlay.signature(), built.pointed)
     if _gpu.get("signature") != signature:
-        _gpu["boxes"] = Boxes(*overlay_data.boxes(built.cells, **overlay.selection()))
+        pointed = () if built.pointed < 0 else overlay_data.alike(built.cells, built.pointed)
+        _gpu["boxes"] = Boxes(*overlay_data.boxes(built.cells, **overlay.selection(), pointed=pointed))
         _gpu["signature"] = signature
     _gpu["boxes"].draw(gpu.matrix.get_projection_matrix() @ gpu.matrix.get_model_view_matrix(), overlay.in_front)
 

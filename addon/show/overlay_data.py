@@ -4,16 +4,22 @@ import numpy as np
 
 #: Cells whose texels fill one row of the texture.
 CELLS_PER_ROW = 1024
-#: Flat cells are drawn so much smaller, so that neighbours can be told apart.
+#: Flat cells and slabs are drawn so much smaller, so that neighbours can be told apart.
 SMALLER = 0.06
 #: Linear colour of cells that have a full occluder: what no colour of the map looks like.
 COVERED = (1.0, 0.05, 0.01)
+#: Of cells that are pointed at, and those that share their list.
+POINTED = (1.0, 0.35, 0.0)
+#: Texels of a cell: two corners of a box, four of a flat cell, twelve of a piece of a plane; and the colour.
+TEXELS = {"quad": 5, "polygon": 13}
 
 #: Sixteen equidistant colours of viridis (van der Walt and Smith 2015, CC0), sRGB: equal steps look equally large.
 VIRIDIS = ("440154", "481a6c", "472f7d", "414487", "39568c", "31688e", "2a788e", "23888e",
            "1f988b", "22a884", "35b779", "54c568", "7ad151", "a5db36", "d2e21b", "fde725")
 
-COLOUR_BY = ("LEVEL", "COUNT", "COST")
+COLOUR_BY = ("LEVEL", "COUNT", "COST", "GROUP")
+#: Multiples of the golden section: numbers next to each other get colours far from each other.
+GOLDEN = 0.5 * (5.0**0.5 - 1.0)
 
 
 def linear(srgb):
@@ -53,7 +59,9 @@ def select(cells, levels=None, leaves_only=False, empty=True):
 
 
 def values(cells, by):
-    """The number that colours each cell, shape (c,): its level, its primitives, or its share of the SAH cost."""
+    """The number that colours each cell, shape (c,): its level, its primitives, its share of the SAH cost, or its group."""
+    if by == "GROUP":
+        return np.full(len(cells), -1) if cells.group is None else cells.group
     return {"LEVEL": cells.level, "COUNT": cells.count, "COST": cells.cost}[by]
 
 
@@ -66,13 +74,18 @@ def scale(cells, by, leaves_only=False):
     value = values(cells, by)
     if leaves_only:
         value = value[cells.leaf]
+    if by == "GROUP":
+        return (0.0, float(len(np.unique(value[value >= 0]))))
     if by != "LEVEL":
         value = value[value > 0]
     return (float(value.min()), float(value.max())) if len(value) else (0.0, 0.0)
 
 
 def place(cells, index, by, leaves_only=False):
-    """Where in the colour map, 0..1, the cells chosen lie, shape (n,); cells without primitives or cost lie at 0."""
+    """Where in the colour map, 0..1, the cells chosen lie, shape (n,); cells without primitives, cost or group lie at 0."""
+    if by == "GROUP":
+        group = values(cells, by)[index]
+        return np.where(group < 0, 0.0, 0.15 + 0.85 * (group * GOLDEN % 1.0)).astype(np.float32)
     low, high = scale(cells, by, leaves_only)
     value = values(cells, by)[index].astype(np.float32)
     if not high > low:
@@ -82,7 +95,7 @@ def place(cells, index, by, leaves_only=False):
     return np.log(np.maximum(value, np.float32(low)) / np.float32(low)) / np.float32(np.log(high / low))
 
 
-def boxes(cells, levels=None, leaves_only=False, empty=True, by="LEVEL", opacity=1.0):
+def boxes(cells, levels=None, leaves_only=False, empty=True, by="LEVEL", opacity=1.0, pointed=()):
     """The texture an instanced draw reads.
 
     Parameters
@@ -90,27 +103,31 @@ def boxes(cells, levels=None, leaves_only=False, empty=True, by="LEVEL", opacity
     cells : Cells
     levels, leaves_only, empty
         See :func:`select`.
-    by : {"LEVEL", "COUNT", "COST"}
+    by : {"LEVEL", "COUNT", "COST", "GROUP"}
         What the colour shows.
     opacity : float
+    pointed : sequence of int
+        Numbers of cells that stand out.
 
     Returns
     -------
     texels : ndarray, shape (rows, k * CELLS_PER_ROW, 4), float32
         RGBA texels, k = 3 a box: lower corner, upper corner, linear colour with opacity; k = 5 a flat cell: its four corners, and
-        the colour. Cells follow each other along a row, so that cell i starts at texel k i.
+        the colour; k = 13 a piece of a plane: twelve corners, and the colour. Cells follow each other along a row, so that cell i starts at texel k i.
     n : int
         Cells in it.
     """
     index = select(cells, levels, leaves_only, empty)
-    n, flat = len(index), cells.volume == "quad"
-    k = 5 if flat else 3
+    n, k = len(index), TEXELS.get(cells.volume, 3)
     texels = np.empty((max(1, -(-n // CELLS_PER_ROW)) * CELLS_PER_ROW, k, 4), np.float32)
     texels[n:] = 0.0
     every = n == len(cells)
-    if flat:
-        corners = cells.shape.reshape(-1, 4, 3)[index]
-        texels[:n, :4, :3] = corners + SMALLER * (corners.mean(axis=1, keepdims=True) - corners)
+    if k > 3:
+        corners = cells.shape.reshape(-1, k - 1, 3)[index]
+        texels[:n, :k - 1, :3] = corners + (SMALLER if k == 5 else 0.0) * (corners.mean(axis=1, keepdims=True) - corners)
+    elif cells.volume == "slab":
+        gap = SMALLER * (cells.hi - cells.lo).min(axis=1, keepdims=True)
+        texels[:n, 0, :3], texels[:n, 1, :3] = (cells.lo + gap)[index], (cells.hi - gap)[index]
     else:
         texels[:n, 0, :3] = cells.lo if every else cells.lo[index]
         texels[:n, 1, :3] = cells.hi if every else cells.hi[index]
@@ -119,4 +136,49 @@ def boxes(cells, levels=None, leaves_only=False, empty=True, by="LEVEL", opacity
     texels[:n, k - 1] = table[(place(cells, index, by, leaves_only) * 255.0 + 0.5).astype(np.uint8)]
     if cells.covered is not None:
         texels[:n, k - 1][cells.covered[index]] = *COVERED, opacity
+    if len(pointed):
+        texels[:n, k - 1][np.isin(index, pointed)] = *POINTED, 1.0
     return texels.reshape(-1, k * CELLS_PER_ROW, 4), n
+
+
+def at_pointer(cells, origin, direction, levels=None, empty=True):
+    """The elementary cell that a ray enters first, of those drawn; of several the smallest. -1 for none.
+
+    Parameters
+    ----------
+    cells : Cells
+    origin, direction : sequence of 3 float
+        Of the ray from the eye through the pointer.
+    levels, empty
+        See :func:`select`.
+    """
+    index = select(cells, levels, leaves_only=True, empty=empty)
+    origin, direction = np.asarray(origin, float), np.asarray(direction, float)
+    direction = np.where(direction == 0.0, 1e-300, direction)
+    a, b = (cells.lo[index] - origin) / direction, (cells.hi[index] - origin) / direction
+    near, far = np.minimum(a, b).max(axis=1), np.maximum(a, b).min(axis=1)
+    met = np.flatnonzero((near <= far) & (far >= 0.0))
+    if not len(met):
+        return -1
+    near = np.maximum(near[met], 0.0)
+    first = met[near <= near.min() * (1.0 + 1e-9)]
+    return int(index[first[(cells.hi - cells.lo)[index[first]].prod(axis=1).argmin()]])
+
+
+def alike(cells, cell):
+    """The numbers of the cells that share a cell's list; itself alone, where lists are not shared."""
+    if cells.group is None or cells.group[cell] < 0:
+        return np.array([cell])
+    return np.flatnonzero(cells.group == cells.group[cell])
+
+
+def described(cells, cell):
+    """A line about a cell: its name, level, primitives, cost, and with how many it shares its list."""
+    name = f"Slab across {'xyz'[cells.group[cell]]}" if cells.volume == "slab" else f"Cell {cell}"
+    if cells.code is not None:
+        name += f", code {cells.code[cell]}"
+    line = f"{name}: level {cells.level[cell]}, {cells.count[cell]:,} primitives, cost {cells.cost[cell]:.3g}"
+    others = len(alike(cells, cell)) - 1
+    if cells.volume != "slab" and cells.group is not None and cells.group[cell] >= 0:
+        line += f", list {cells.group[cell]} shared with {others:,} other cell{'s' * (others != 1)}"
+    return line

@@ -75,9 +75,10 @@ def draw_overlay(layout, scene):
         low, high = (f"{end:.3g}" if overlay.colour_by == "COST" else f"{end:,.0f}" for end in _ends(built, overlay.colour_by, overlay.leaves_only))
         row = layout.row()
         row.alignment = "RIGHT"
-        row.label(text=f"Purple {low}, yellow {high}")
+        row.label(text=f"{high} lists or axes" if overlay.colour_by == "GROUP" else f"Purple {low}, yellow {high}")
     layout.prop(overlay, "opacity", slider=True)
     layout.prop(overlay, "in_front")
+    layout.operator("rayscope.point", icon="EYEDROPPER")
 
 
 def _ends(built, *choice):

@@ -105,7 +105,8 @@ class RAYSCOPE_PG_overlay(bpy.types.PropertyGroup):
     colour_by: EnumProperty(name="Color By", description="What the colors show", update=_redraw, items=(
         ("LEVEL", "Level", "Levels below the root"),
         ("COUNT", "Primitives", "References to primitives in the cell or below it, on a logarithmic scale"),
-        ("COST", "Cost", "Expected tests for a random ray that meets the root, on a logarithmic scale")))
+        ("COST", "Cost", "Expected tests for a random ray that meets the root, on a logarithmic scale"),
+        ("GROUP", "Shared List", "Cells that share one list of primitives, or slabs across one axis, have one color")))
     opacity: FloatProperty(name="Opacity", description="How opaque the lines are", default=0.8, min=0.0, max=1.0, subtype="FACTOR", update=_redraw)
     in_front: BoolProperty(name="In Front", description="Draw the lines through the surfaces that hide them", default=True, update=_redraw)
 

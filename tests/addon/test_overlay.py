@@ -51,7 +51,7 @@ def test_viridis_is_linear_and_gets_lighter():
     assert overlay_data.linear(0.5) == pytest.approx(0.21404, abs=1e-5)
 
 
-@pytest.mark.parametrize("by", overlay_data.COLOUR_BY)
+@pytest.mark.parametrize("by", ["LEVEL", "COUNT", "COST"])
 def test_colours_span_the_map_and_do_not_change_with_the_levels_shown(by):
     cells = tree()
     everything = np.arange(len(cells))
@@ -185,3 +185,45 @@ def test_flat_cells_are_drawn_as_they_lie_and_full_occluders_stand_out():
     # Its four sides, and no diagonal: the middle stays dark.
     centre = (100 + 100 * (first.mean(axis=0) + (0.6, 0.1, 0.0))[:2]).astype(int)
     assert not lit[centre[1] - 5:centre[1] + 5, centre[0] - 5:centre[0] + 5].any()
+
+
+def test_what_is_pointed_at():
+    """Eight cells in a row along x, every third empty."""
+    cells = tree()
+    leaves = np.flatnonzero(cells.leaf)
+    assert overlay_data.at_pointer(cells, (-5, 0.5, 0.5), (1, 0, 0)) == leaves[0]
+    assert overlay_data.at_pointer(cells, (-5, 0.5, 0.5), (1, 0, 0), empty=False) == leaves[1], "only what is drawn"
+    assert overlay_data.at_pointer(cells, (5, 0.5, 0.5), (-1, 0, 0)) == leaves[7]
+    assert overlay_data.at_pointer(cells, (0.9, -3, 0.5), (0, 1, 0)) == leaves[7]
+    assert overlay_data.at_pointer(cells, (0.9, -3, 0.5), (0, -1, 0)) == -1, "behind the eye"
+    assert overlay_data.at_pointer(cells, (0.9, -3, 1.5), (0, 1, 0)) == -1
+    assert overlay_data.at_pointer(cells, (5, 0.5, 0.5), (-1, 0, 0), levels=(0, 2)) == -1, "leaves are on level 3"
+
+
+def test_cells_that_share_a_list_stand_out_together():
+    cells = tree()
+    leaves = np.flatnonzero(cells.leaf)
+    assert overlay_data.alike(cells, 5).tolist() == [5] and "list" not in overlay_data.described(cells, 5)
+    cells.group, cells.code = np.full(15, -1), np.arange(15) + 100
+    cells.group[leaves[[1, 4, 7]]] = 9
+    assert overlay_data.alike(cells, leaves[4]).tolist() == leaves[[1, 4, 7]].tolist()
+    text = overlay_data.described(cells, int(leaves[4]))
+    assert f"code {100 + leaves[4]}" in text and "shared with 2 other cells" in text and "level 3" in text
+    texels, n = overlay_data.boxes(cells, pointed=overlay_data.alike(cells, leaves[4]))
+    colours = texels.reshape(-1, 3, 4)[:n, 2, :3]
+    assert (np.isclose(colours, overlay_data.POINTED).all(axis=1) == (cells.group == 9)).all()
+    place = overlay_data.place(cells, leaves, "GROUP")
+    assert (place[[0, 2]] == 0.0).all() and len(set(place[[1, 4, 7]].tolist())) == 1 and place[1] > 0.1
+
+
+def test_slabs_are_drawn_apart_and_planes_by_their_corners():
+    lo, hi = [(0, 0, 0), (0, 0, 0), (0.5, 0, 0)], [(1, 1, 1), (0.5, 1, 1), (1, 1, 1)]
+    slabs = Cells.make(lo, hi, [0, 1, 1], [3, 2, 1], [False, True, True], [-1, 0, 0], "slab")
+    texels, n = overlay_data.boxes(slabs)
+    corners = texels.reshape(-1, 3, 4)[:n, :2, :3]
+    assert corners[1, 1, 0] < 0.5 < corners[2, 0, 0]
+    pieces = np.random.default_rng(0).random((3, 12, 3))
+    planes = Cells.make(lo, hi, [0, 1, 1], [3, 2, 1], [False, True, True], [-1, 0, 0], "polygon", pieces.reshape(3, -1))
+    texels, n = overlay_data.boxes(planes, by="COUNT")
+    assert texels.shape[1] == 13 * overlay_data.CELLS_PER_ROW and n == 3
+    np.testing.assert_allclose(texels.reshape(-1, 13, 4)[:3, :12, :3], pieces, rtol=1e-6)

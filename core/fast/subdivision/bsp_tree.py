@@ -8,6 +8,7 @@ rounding of a cut.
 
 import numpy as np
 
+from ...cell_shapes import plane_pieces
 from ...cells import DIRECTIONS, bsp_notice, depth_for
 from ...hits import box_area
 from .growth import Cells
@@ -44,6 +45,17 @@ class BspTree(CellTree):
         self.grow(root, progress, stop, max_depth or depth_for(n), leaf_size, max_bytes, "heap", lists)
         if self.figures["N_ER"] > 8 * n:
             self.notices.append(bsp_notice(self.figures["N_ER"], n))
+
+    def cells(self):
+        """All cells, with that part of its plane which divides each."""
+        cells = super().cells()
+        if self.primitives.n:
+            t = self.tree
+            below = np.arange(t.n) - t.child[np.maximum(t.parent, 0)] - 1
+            # Of a root alone there are no planes at all.
+            planes = t.plane.T if t.n > 1 else np.full((1, 4), np.inf)
+            cells.volume, cells.shape = "polygon", plane_pieces(planes, t.parent, below, self.lo, self.hi).reshape(t.n, -1)
+        return cells
 
     def divide_cells(self, cells, worth):
         """Divide cells; see ``growth.grow``."""

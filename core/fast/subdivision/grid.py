@@ -200,9 +200,9 @@ class Grid(Structure):
         """The whole box, then every cell."""
         if not self.primitives.n:
             return super().cells()
-        n = len(self.lists.count)
+        n, group = len(self.lists.count), self.lists.group()
         index = self._indices(np.arange(n)).T
-        return Cells.make(
+        cells = Cells.make(
             np.concatenate([[self.lo], self._plane(index)]),
             np.concatenate([[self.hi], self._plane(index + 1)]),
             np.concatenate([[0], np.ones(n)]),
@@ -210,6 +210,8 @@ class Grid(Structure):
             np.concatenate([[False], np.ones(n, bool)]),
             np.concatenate([[-1], np.zeros(n)]),
         )
+        cells.group = None if group is None else np.concatenate([[-1], group])
+        return cells
 
 
 class Walk:

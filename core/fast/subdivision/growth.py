@@ -195,8 +195,7 @@ class _Growth:
         growth = np.where(good, children.count.reshape(-1, self.arity).sum(axis=1) - some.count, 0)
         over = np.flatnonzero(good & (references + np.cumsum(growth) - growth > self.limit))
         if len(over):
-            good = good.copy()
-            good[over] = False
+            good[over[0] :], growth[over[0] :] = False, 0
             self._notice(some.lo[over[0]], some.hi[over[0]], level, int(some.count[over[0]]))
         return good, references + int(growth.sum())
 

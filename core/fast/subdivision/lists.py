@@ -78,6 +78,10 @@ class Lists:
             some.items = self.items[ranges(self.start[cell], some.count)]
         return some
 
+    def group(self):
+        """The number of the list that each cell shares, -1 for empty ones; None where nothing is shared."""
+        return None if self.list_of is None else np.where(self.count > 0, self.list_of, -1).astype(np.int64)
+
     @property
     def lists(self):
         """How many lists there are, the empty one not counted where it is shared."""

@@ -7,6 +7,7 @@ import math
 
 import numpy as np
 
+from ...cell_shapes import covering, with_regions
 from .grid import Grid
 
 #: Cells by which a region reaches beyond its cell, at most: so a byte holds it.
@@ -80,6 +81,18 @@ class MacroGrid(Grid):
 
             reach[side] = _most(fits, reach[side])
         return reach
+
+    def cells(self):
+        """The whole box, every cell, and a few of the regions that cover the empty ones; a region's count is its cells."""
+        if not self.primitives.n:
+            return super().cells()
+        empty = np.flatnonzero(self.lists.count == 0)
+        index, reach = self._indices(empty).T, self.reach[:, empty].T.astype(np.int64)
+        lo, hi = np.maximum(index - reach[:, :3], 0), np.minimum(index + reach[:, -3:], self.resolution - 1)
+        some = covering(lo, hi, self.resolution)
+        return with_regions(
+            super().cells(), self._plane(lo[some]), self._plane(hi[some] + 1), (hi - lo + 1)[some].prod(axis=1)
+        )
 
     def walk(self, walk, visits, query):
         ray = walk.ray

@@ -43,8 +43,11 @@ class Octree(CellTree):
     def cells(self):
         if not self.primitives.n or self.storage is None:
             return super().cells()
-        _, lo, hi, level, parent, leaf = self.storage.nodes()
-        return self.boxes(lo, hi, level, parent, leaf >= 0, np.where(leaf >= 0, self.lists.count[leaf], 0))
+        code, lo, hi, level, parent, leaf = self.storage.nodes()
+        cells = self.boxes(lo, hi, level, parent, leaf >= 0, np.where(leaf >= 0, self.lists.count[leaf], 0))
+        cells.code, group = code, self.lists.group()
+        cells.group = None if group is None else np.where(leaf >= 0, group[leaf], -1)
+        return cells
 
     def divide_cells(self, cells, worth):
         """Divide cells; see ``growth.grow``."""

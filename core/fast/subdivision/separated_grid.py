@@ -100,14 +100,17 @@ class SeparatedGrid(Grid):
             hi.append(high)
         count = self._slab_counts()
         n = len(count)
-        return Cells.make(
+        cells = Cells.make(
             np.concatenate(lo),
             np.concatenate(hi),
             np.repeat([0, 1], [1, n]),
             np.concatenate([[self.figures["N_ER"]], count]),
             np.repeat([False, True], [1, n]),
             np.repeat([-1, 0], [1, n]),
+            "slab",
         )
+        cells.group = np.concatenate([[-1], np.repeat(self.axes, self.resolution[self.axes])])
+        return cells
 
 
 class Bits:

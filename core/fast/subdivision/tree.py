@@ -171,7 +171,9 @@ class CellTree(Structure):
         if not self.primitives.n:
             return super().cells()
         t = self.tree
-        return self.boxes(t.lo, t.hi, t.level, t.parent, t.child < 0, self.lists.count)
+        cells = self.boxes(t.lo, t.hi, t.level, t.parent, t.child < 0, self.lists.count)
+        cells.group = self.lists.group()
+        return cells
 
     @staticmethod
     def boxes(lo, hi, level, parent, leaf, count):

@@ -8,6 +8,7 @@ rounding of a cut.
 
 import math
 
+from ...cell_shapes import plane_pieces
 from ...cells import DIRECTIONS, bsp_notice, depth_for
 from ..primitives.solids import divide as quotient
 from .lists import Visits
@@ -37,6 +38,19 @@ class BspTree(CellTree):
         self.grow(root, progress, stop, max_depth or depth_for(n), leaf_size, max_bytes, "heap", lists)
         if self.figures["N_ER"] > 8 * n:
             self.notices.append(bsp_notice(self.figures["N_ER"], n))
+
+    def cells(self):
+        """All cells, with that part of its plane which divides each."""
+        cells = super().cells()
+        if self.primitives:
+            below = [-1] * len(self.nodes)
+            for node in self.nodes:
+                for part, child in enumerate(node.children or ()):
+                    below[child.number] = part - 1
+            planes = [node.plane if node.children else (math.inf,) * 4 for node in self.nodes]
+            pieces = plane_pieces(planes, cells.parent, below, self.nodes[0].lo, self.nodes[0].hi)
+            cells.volume, cells.shape = "polygon", pieces.reshape(len(planes), -1)
+        return cells
 
     def divide(self, node):
         tolerance, best, plane = TOLERANCE * self.margin, math.inf, None

@@ -6,6 +6,7 @@ Fujimoto, Tanaka and Iwata (1986); Amanatides and Woo (1987).
 import itertools
 import math
 
+from ...cell_shapes import groups_of
 from ...cells import GRID_OVERLAP, cells_along, too_many
 from ...errors import MemoryEstimateError
 from ...hits import Cells
@@ -228,6 +229,9 @@ class Grid(Structure):
             lo.append([self._plane(axis, index[axis]) for axis in range(3)])
             hi.append([self._plane(axis, index[axis] + 1) for axis in range(3)])
         n = len(self.lists)
-        return Cells.make(
+        cells = Cells.make(
             lo, hi, [0] + [1] * n, [self.figures["N_ER"], *map(len, self.lists)], [False] + [True] * n, [-1] + [0] * n
         )
+        if self.parameters["lists"] == "shared":
+            cells.group = groups_of([(), *self.lists])
+        return cells

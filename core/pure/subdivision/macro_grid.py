@@ -4,7 +4,9 @@ Sramek (1994), Devillers (1989): cubes by a chessboard distance transform, or bo
 """
 
 import itertools
+import math
 
+from ...cell_shapes import columns, covering, with_regions
 from .grid import Grid
 
 #: Cells by which a region reaches beyond its cell, at most: so a byte holds it.
@@ -85,6 +87,23 @@ class MacroGrid(Grid):
             while reach[side] < min(REACH, top) and fits([r + (s == side) for s, r in enumerate(reach)]):
                 reach[side] += 1
         return reach
+
+    def cells(self):
+        """The whole box, every cell, and a few of the regions that cover the empty ones; a region's count is its cells."""
+        if not self.primitives:
+            return super().cells()
+        inside = [
+            self.region(number, index)
+            for number, index in enumerate(itertools.product(*map(range, self.resolution)))
+            if not self.lists[number]
+        ]
+        lo, hi, count = [], [], []
+        for k in covering(*columns(inside), self.resolution):
+            low, high = inside[k]
+            lo.append([self._plane(axis, low[axis]) for axis in range(3)])
+            hi.append([self._plane(axis, high[axis] + 1) for axis in range(3)])
+            count.append(math.prod(h - l + 1 for l, h in zip(low, high)))
+        return with_regions(super().cells(), *columns(zip(lo, hi)), count)
 
     def region(self, number, cell):
         reach = self.reach[self.sides * number : self.sides * (number + 1)]

@@ -4,6 +4,7 @@ Glassner (1984); Octree-R with planes by cost: Whang et al. (1995).
 """
 
 from ...cells import check_storage
+from ...cell_shapes import codes
 from . import leaf_codes
 from .tree import CellTree, Node
 
@@ -22,7 +23,9 @@ class Octree(CellTree):
         self.grow(self.root(), progress, stop, max_depth, leaf_size, max_bytes, walk, lists)
         if storage != "pointers":
             self.storage = leaf_codes.STORAGES[storage](self.nodes)
-            self.boxes, self.nodes = super().cells(), self.nodes[:1]
+            self.boxes = super().cells()
+            self.boxes.code = codes(self.nodes)
+            self.nodes = self.nodes[:1]
             self.figures.update(self.storage.figures(), memory=self.storage.memory())
 
     def locate_box(self, query, t, t_end):

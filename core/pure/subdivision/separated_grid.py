@@ -10,6 +10,7 @@ import math
 import operator
 from bisect import bisect_left
 
+from ...cell_shapes import axes_of
 from ...cells import too_many_slabs
 from ...errors import MemoryEstimateError
 from ...hits import Cells
@@ -97,7 +98,11 @@ class SeparatedGrid(Grid):
                 lo.append([self._plane(a, k) if b == a else x for b, x in enumerate(self.lo)])
                 hi.append([self._plane(a, k + 1) if b == a else x for b, x in enumerate(self.hi)])
         n = len(self.count)
-        return Cells.make(lo, hi, [0] + [1] * n, [sum(self.count), *self.count], [False] + [True] * n, [-1] + [0] * n)
+        cells = Cells.make(
+            lo, hi, [0] + [1] * n, [sum(self.count), *self.count], [False] + [True] * n, [-1] + [0] * n, "slab"
+        )
+        cells.group = axes_of([(-1, 1), *((a, self.resolution[a]) for a in self.axes)])
+        return cells
 
 
 def _common_bits(vectors):

@@ -10,6 +10,7 @@ import math
 import sys
 from collections import deque
 
+from ...cell_shapes import groups_of
 from ...cells import REFERENCES_AT_LEAST, REFERENCES_PER_PRIMITIVE, TREE_OVERLAP, limit_notice
 from ...hits import Cells
 from ..ray import EPSILON
@@ -192,7 +193,7 @@ class CellTree(Structure):
             N_EE=sum(not node.items for node in leaves),
             N_ER=sum(len(node.items) for node in leaves),
             depth=max(node.level for node in leaves),
-            c_SAH=float(self.cells().cost.sum()),
+            c_SAH=float(CellTree.cells(self).cost.sum()),
             memory=sum(node.bytes() for node in self.nodes),
         )
         if self.parameters["lists"] == "shared":
@@ -277,7 +278,7 @@ class CellTree(Structure):
         below = [len(node.items) for node in self.nodes]
         for node in reversed(self.nodes[1:]):
             below[node.parent.number] += below[node.number]
-        return Cells.make(
+        cells = Cells.make(
             [node.lo for node in self.nodes],
             [node.hi for node in self.nodes],
             [node.level for node in self.nodes],
@@ -285,6 +286,9 @@ class CellTree(Structure):
             [not node.children for node in self.nodes],
             [node.parent.number if node.parent else -1 for node in self.nodes],
         )
+        if self.parameters["lists"] == "shared":
+            cells.group = groups_of(node.items for node in self.nodes)
+        return cells
 
 
 def crossing(ray, axis, plane):
