@@ -7,6 +7,7 @@ from . import session
 from .read import read_scene
 from ..core.errors import Cancelled, SceneError
 from ..core.lab.estimate import estimate
+from ..core.options import STANDARD
 from ..core.scene.camera import check_size
 
 
@@ -14,6 +15,16 @@ def choice_of(scene):
     """A Blender scene's technique, as keywords of :class:`~rayscope.core.rendering.Rendering`."""
     settings = scene.rayscope
     return {"technique": settings.technique, "core": settings.core_used(), "parameters": settings.values()}
+
+
+def kinds_of(scene):
+    """A Blender scene's techniques for the kinds of ray that have one of their own, as keywords of the same."""
+    settings = scene.rayscope
+    if not settings.row().ray_by_ray:
+        return {}
+    kinds = {kind: getattr(settings, kind) for kind in ("primary", "secondary", "shadow")}
+    kinds = {kind: STANDARD if name == "chosen" and kind not in settings.row().rays else name for kind, name in kinds.items()}
+    return {kind: name for kind, name in kinds.items() if name != "chosen"}
 
 
 def options_of(scene):
@@ -87,7 +98,7 @@ class Trace:
         self.scene = read_scene(depsgraph, for_render=True, camera=camera, size=self.size)
         if self.scene.camera is None:
             raise SceneError("\n".join(str(notice) for notice in self.scene.notices if "camera" in notice.text))
-        self.choice, self.options = choice_of(scene), options_of(scene)
+        self.choice, self.options = choice_of(scene) | kinds_of(scene), options_of(scene)
         self.result, self.changed = None, False
         self.estimate = estimate(self.scene, self.choice["technique"], self.choice["core"], self.size, self.options["samples"],
                                  self.options["depth"]).check_memory()

@@ -61,6 +61,11 @@ class Technique:
         folder = "peers" if self.family == "peers" else f"{core}.{self.family}"
         return _class(f"{folder}.{self.module}.{self.structure}")
 
+    @property
+    def ray_by_ray(self):
+        """Whether pictures are traced ray by ray: then the kinds of ray may have techniques of their own."""
+        return self.tracer == Technique.tracer
+
     def load_tracer(self, core):
         """Import the tracer of pictures made with it in one core, and return its class."""
         return _class(f"{core}.{self.tracer}")

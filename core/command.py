@@ -22,10 +22,10 @@ from .catalogue import CORES, technique, techniques
 from .errors import Cancelled, MemoryEstimateError, MissingPackageError, ParameterError, RayscopeError
 from .figures import FIGURES
 from .lab import report
+from .options import AUTOMATIC
 from .parameters import resolve
-from .rendering import AUTOMATIC
 from .scene.camera import check_size
-from .scene.files import ENDINGS, read_file
+from .scene.files import ENDINGS, OWN, read_file
 
 DONE, FAILED, WRONG_CALL = 0, 1, 2
 
@@ -58,7 +58,7 @@ class Outcome:
     code: int = DONE
 
 
-def main(argv=None, read_scene=None, open_in_blender=None):
+def main(argv=None, read_scene=None, open_in_blender=None, read_frames=None):
     """Run the command.
 
     Parameters
@@ -70,6 +70,8 @@ def main(argv=None, read_scene=None, open_in_blender=None):
         the scene's own proportions (None). The verbs then take no FILE.
     open_in_blender : callable, optional
         ``open_in_blender(path, size)`` reads a file that only Blender can read.
+    read_frames : callable, optional
+        ``read_frames(first, last, step, size, progress)`` reads the animation that is open in Blender: numbers and scenes.
 
     Returns
     -------
@@ -83,6 +85,7 @@ def main(argv=None, read_scene=None, open_in_blender=None):
     except ParameterError as error:
         return _fail(f"rayscope: {error}", WRONG_CALL)
     call.scene = lambda size=None: _scene(call, read_scene, open_in_blender, size)
+    call.read_frames = read_frames
     try:
         outcome = VERBS[call.verb].run(call)
         print(report.to_json(outcome.json) if call.json else outcome.text, flush=True)
@@ -498,6 +501,58 @@ def motion_verb(call):
     return Outcome(motion.text(result), record)
 
 
+# --- frames -----------------------------------------------------------------------------------------------------------
+
+def frame_range(text):
+    """A type of option: FIRST:LAST or FIRST:LAST:STEP."""
+    match = re.fullmatch(r"(-?\d+):(-?\d+)(?::(\d+))?", text)
+    if not match:
+        raise argparse.ArgumentTypeError(f"frames are written FIRST:LAST or FIRST:LAST:STEP, not {text!r}")
+    return tuple(None if part is None else int(part) for part in match.groups())
+
+
+def frames_options(sub):
+    sub.add_argument("--frames", metavar="FIRST:LAST[:STEP]", type=frame_range, default=(None, None, None), help="without it the file's own range")
+    sub.add_argument("--set", metavar="PARAMETER=VALUE", type=assignment, action="append", default=[], help="a parameter of ray-classification")
+    sub.add_argument("--core", choices=CORES, default="fast")
+    sub.add_argument("--rays", metavar="N", type=whole(1, 1_000_000), default=2000, help="primary rays in each frame, and as many bounces and shadow rays")
+    sub.add_argument("--seed", type=whole(0, 2**31 - 1), default=0)
+    sub.add_argument("--size", metavar="WxH", type=picture_size, help=f"of the pictures, pixels; without it {DEFAULT_SIDE} on the longer side")
+    sub.add_argument("--out", metavar="DIR", help="write the table there, and a picture of every frame")
+
+
+def frames_verb(call):
+    """One ray classification for all frames of an animation."""
+    from .image_file import save_png
+    from .lab import frames
+    from .rendering import trace
+
+    parameters = checked((frames.TECHNIQUE, dict(call.set)), call.core)[1]
+    scene = call.scene(call.size)
+    if call.read_frames is None or str(getattr(call, "file", ".blend")).lower().endswith(OWN):
+        raise ParameterError("frames: an animation is needed, and only a .blend file holds one.")
+    size = call.size or proportional(scene.camera)
+    with stoppable() as progress:
+        numbers, scenes = call.read_frames(*call.frames, size, progress)
+        index, result = frames.frames(scenes, numbers, call.core, call.rays, call.seed, parameters, say)
+        text = [frames.text(result)]
+        if call.out:
+            out = report.folder(call.out)
+            for k, (number, one) in enumerate(zip(numbers, scenes)):
+                path = out / f"frame_{number:04d}.png"
+                save_png(path, trace(one, core=call.core, size=size, index=index.at(k), progress=progress).image)
+                text.append(f"picture: {path}")
+    asked = {"frames": numbers, "parameters": parameters, "core": call.core, "rays": call.rays, "size": size}
+    record = report.record("frames", scene, call.seed, asked, meanings=frames.MEANINGS, **result)
+    if call.out:
+        path = out / "frames.json"
+        path.write_text(report.to_json(record) + "\n", encoding="utf-8")
+        text.append(f"written: {path}")
+    for notice in index.notices:
+        say(str(notice))
+    return Outcome("\n".join(text), record, FAILED if result["failed"] else DONE)
+
+
 # --- needs ------------------------------------------------------------------------------------------------------------
 
 def needs_options(sub):
@@ -640,6 +695,7 @@ VERBS = {
     "kernels": Verb("compare tests of a ray against a triangle or a box: time, operations, bytes, wrong answers", kernels_verb, kernels_options,
                     scene=False),
     "stability": Verb("run techniques on stiff and extreme cases against exact arithmetic", stability_verb, stability_options, scene=False),
+    "frames": Verb("build one ray classification for all frames of an animation, and hold it against a build for each", frames_verb, frames_options),
     "needs": Verb("say what the scene needs, what is left out and why", needs_verb, needs_options),
     "inspect": Verb("say what each object costs, and what could be done", inspect_verb, inspect_options),
 }

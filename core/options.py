@@ -2,6 +2,9 @@
 
 from .parameters import Parameter
 
+#: The technique of rays that have no other; and the name that leaves the choice to :mod:`~rayscope.core.lab.needs`.
+STANDARD, AUTOMATIC = "bvh", "automatic"
+
 #: What can be set besides the techniques; panels and the command take their ranges from here.
 PARAMETERS = (
     Parameter(

@@ -14,7 +14,7 @@ from .catalogue import CORES, build, technique as technique_row
 from .errors import Cancelled, MemoryEstimateError, Notice, ParameterError, SceneError
 from .figures import PER_RAY, ray_figures
 from .memory import free_memory
-from .options import PARAMETERS
+from .options import AUTOMATIC, PARAMETERS, STANDARD
 from .parameters import resolve
 from .scene.camera import check_size
 
@@ -31,9 +31,6 @@ PASSES = {
     "n_ts": (1, np.int64, 0),
 }
 COUNTED_PASSES = ("n_it", "n_ts")
-
-#: The name that leaves the choice to :mod:`~rayscope.core.lab.needs`; and what serves rays that are not needed.
-AUTOMATIC, STANDARD = "automatic", "bvh"
 
 #: Share of the progress bar that building takes.
 BUILDING = 0.1

@@ -168,6 +168,10 @@ class Tracing:
         if fewer.threshold:
             column.prop(fewer, "roulette")
         column.prop(settings, "count")
+        if settings.row().ray_by_ray:
+            column = layout.column(heading="Rays")
+            for kind in ("primary", "secondary", "shadow"):
+                column.prop(settings, kind)
 
 
 class Figures:

@@ -26,13 +26,22 @@ def _title(choice):
     return choice.upper() if choice in ("sah", "ploc", "lbvh") else choice.replace("_", " ").replace("-", " ").title()
 
 
-def _techniques():
-    """The technique menu's items, families as headings."""
+def _techniques(kind=None):
+    """A technique menu's items, families as headings; with a kind of ray, only those that serve it."""
     items = []
-    for family, rows in groupby(catalogue.techniques(), key=lambda row: row.family):
+    served = [row for row in catalogue.techniques() if kind is None or kind in row.rays and row.ray_by_ray]
+    for family, rows in groupby(served, key=lambda row: row.family):
         items.append(("", FAMILIES.get(family, family.title()), ""))
         items += [(row.name, row.label, f"{row.help} ({row.source})", "NONE", _number(row.name)) for row in rows]
     return items
+
+
+def _kind(kind, rays):
+    """The menu of the technique for one kind of ray."""
+    first = [("", "Choice", ""), ("chosen", "As Built", "The technique and parameters chosen under Structure, or a bounding volume hierarchy if that "
+                                  f"technique does not serve {rays}", "NONE", 0),
+             ("automatic", "Automatic", "What is expected to be fastest for this scene, by a cost model measured on this machine", "NONE", _number("automatic"))]
+    return EnumProperty(name=kind.title(), description=f"Technique for {rays}, with its default parameters", items=first + _techniques(kind), default="chosen")
 
 
 def _property(parameter, core):
@@ -131,6 +140,9 @@ class RAYSCOPE_PG_settings(bpy.types.PropertyGroup):
     samples: IntProperty(name="Samples", description="Rays from the camera for each pixel", default=1, min=1, max=4096, soft_max=64)
     seed: IntProperty(name="Seed", description="Start of the random numbers that place the samples; the same seed gives the same picture", min=0)
     fewer_rays: PointerProperty(type=RAYSCOPE_PG_fewer_rays)
+    primary: _kind("primary", "rays from the camera")
+    secondary: _kind("secondary", "reflected, refracted and transparent rays")
+    shadow: _kind("shadow", "rays to lights")
     count: BoolProperty(name="Count", description="Count intersection tests and traversal steps, for the figures and the render passes N_IT, N_TS and "
                         "Rays per Pixel; it takes some time", default=False)
     csg: BoolProperty(name="CSG from Booleans", description="Trace objects with Boolean modifiers as CSG trees of their operands, closed meshes and "

@@ -15,13 +15,12 @@ import numpy as np
 
 from ..catalogue import build, technique, techniques
 from ..errors import RayscopeError
+from ..options import AUTOMATIC, STANDARD
 from ..scene.layout import Layout, to_world
 from ..scene.scene import Mesh, Scene
 from . import report
 from .rays import ray_sets
 
-#: The name that stands for the technique chosen here.
-AUTOMATIC = "automatic"
 KINDS = ("primary", "secondary", "shadow")
 #: Primitives that are looked at, at most.
 SAMPLE = 2000
@@ -41,7 +40,6 @@ TRUST = 3.0
 BUDGET = 0.65
 #: Another technique must be faster than the standard one by this part, as the model is not exact.
 MARGIN = 0.25
-STANDARD = "bvh"
 #: Techniques estimated to take this many times as long as it are not traced to compare.
 HOPELESS = 8.0
 #: Databases of :func:`benchmark`, with size factors that give some hundred primitives.

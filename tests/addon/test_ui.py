@@ -177,3 +177,26 @@ def test_too_little_memory_is_said_before(scene, monkeypatch):
         with pytest.raises(RuntimeError, match="GB of memory would be needed for 12 primitives"):
             operator()
     assert session.built_of(scene) is None
+
+
+def test_kinds_of_rays_have_techniques_of_their_own(scene, monkeypatch):
+    from bl_ext.user_default.rayscope.addon import tasks
+
+    scene.render.resolution_x, scene.render.resolution_y = 12, 10
+    settings = scene.rayscope
+
+    def used():
+        figures = tasks.Trace(bpy.context.evaluated_depsgraph_get())(lambda fraction: None).figures
+        return figures["primary"]["technique"], figures["shadow"]["technique"]
+
+    assert used() == ("bvh", "bvh")
+    settings.technique = "image-directory"
+    assert used() == ("image-directory", "bvh")
+    settings.technique, settings.shadow = "grid", "light-buffer"
+    assert used() == ("grid", "light-buffer")
+    settings.primary = settings.shadow = "automatic"
+    monkeypatch.setattr("bl_ext.user_default.rayscope.core.lab.needs.resolve_automatic", lambda *a: {"primary": "octree", "shadow": "kd-tree"})
+    assert used() == ("octree", "kd-tree")
+    items = {kind: {i.identifier for i in settings.bl_rna.properties[kind].enum_items} for kind in ("primary", "secondary", "shadow")}
+    assert "image-directory" in items["primary"] and "image-directory" not in items["shadow"]
+    assert all("cones" not in names and {"chosen", "automatic", "bvh"} <= names for names in items.values())
