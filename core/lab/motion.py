@@ -14,12 +14,16 @@ from ..catalogue import build
 from ..fast.rays import Rays
 from ..hits import box_area
 from ..scene.scene import Mesh, Object, Scene, Shapes
+from ..scene.solids import bounds
 from .rays import extent, primary_rays
 
 #: What is compared: technique, parameters.
 TREES = (
     ("bvh", {"builder": "ploc"}), ("bvh", {"builder": "sah", "walk": "best-first"}), ("bvh", {"builder": "incremental"}), ("r-tree", {}),
     ("sphere-tree", {}), ("obb-tree", {}), ("kdop-tree", {"k": "6"}), ("kdop-tree", {"k": "14"}), ("kdop-tree", {"k": "26"}))
+
+#: How a distribution is told.
+QUANTILES = {"min": 0.0, "low": 0.25, "median": 0.5, "high": 0.75, "max": 1.0}
 
 #: Pairs of rays and volumes timed at a time.
 PAIRS = 16_384
@@ -62,15 +66,25 @@ def moved(scene, frame, seed=0, turn=math.radians(7.0), way=0.02):
         to_world, solids = obj.matrix, []
         back = np.linalg.inv(to_world)
         for solid in obj.geometry.solids:
-            if not hasattr(solid, "kind"):              # a CSG tree stays where it is
-                solids.append(solid)
-                continue
-            world = to_world @ solid.matrix
-            corners = solid.values.get("points")
-            centre = world[:3, 3] if corners is None else world[:3, :3] @ np.mean(corners, axis=0) + world[:3, 3]
-            solids.append(replace(solid, matrix=back @ _motion(rng, centre, turn * frame, step) @ world))
+            centre = to_world[:3, :3] @ _centre(solid) + to_world[:3, 3]
+            solids.append(_put(solid, back @ _motion(rng, centre, turn * frame, step) @ to_world))
         objects.append(Object(obj.name, Shapes(solids, obj.geometry.name), obj.matrix, obj.materials))
     return Scene(objects, scene.lights, scene.camera, scene.world, name=scene.name)
+
+
+def _centre(solid):
+    """A point about which a solid turns."""
+    if solid.kind == "csg":
+        return np.mean(bounds(solid), axis=0)
+    corners = solid.values.get("points")
+    return solid.matrix[:3, 3] if corners is None else solid.matrix[:3, :3] @ np.mean(corners, axis=0) + solid.matrix[:3, 3]
+
+
+def _put(solid, matrix):
+    """A solid, or all leaves of a combination, taken elsewhere."""
+    if solid.kind == "csg":
+        return replace(solid, left=_put(solid.left, matrix), right=_put(solid.right, matrix))
+    return replace(solid, matrix=matrix @ solid.matrix)
 
 
 def _motion(rng, centre, angle, step):
@@ -161,8 +175,8 @@ def spread(scene, shuffles=20, n_rays=2000, seed=0):
     Returns
     -------
     list of dict
-        order, trees, and of each figure (c_SAH, c_GS, N_IT, N_TS) the mean, and for shuffled also least, median and most
-        under ``c_SAH min`` and so on.
+        order, trees, and of each figure (c_SAH, c_GS, N_IT, N_TS) the mean, and under ``c_SAH min`` and so on the least (min),
+        the quartiles (low, median, high), the greatest (max), and all of them (values).
     """
     rays = primary_rays(scene, n_rays, np.random.default_rng(seed))
     rows = []
@@ -176,7 +190,8 @@ def spread(scene, shuffles=20, n_rays=2000, seed=0):
         for name in trees[0]:
             values = [t[name] for t in trees]
             row[name] = float(np.mean(values))
-            row.update({f"{name} min": min(values), f"{name} median": float(np.median(values)), f"{name} max": max(values)})
+            row.update({f"{name} {what}": float(np.quantile(values, share)) for what, share in QUANTILES.items()})
+            row[f"{name} values"] = values
         rows.append(row)
     return rows
 
@@ -186,6 +201,7 @@ def text(result):
     from . import report
     lines = [report.table(result["rows"], COLUMNS), "", *(f"{name}: {meaning}" for name, meaning in MEANINGS.items())]
     if result.get("spread"):
-        columns = ["order", "trees", *(f"{name} {what}" for name in ("c_SAH", "c_GS", "N_IT", "N_TS") for what in ("min", "median", "max"))]
-        lines += ["", "The incremental builder, by the order of insertion:", report.table(result["spread"], columns)]
+        lines += ["", "The incremental builder, by the order of insertion: the least, the quartiles and the greatest of all trees"]
+        for name in ("c_SAH", "c_GS", "N_IT", "N_TS"):
+            lines += ["", report.table(result["spread"], ["order", "trees", *(f"{name} {what}" for what in QUANTILES)])]
     return "\n".join(lines)
