@@ -36,8 +36,8 @@ class Bsp:
         Boxes around all faces in and below a node.
     points, count, surface
         The faces, node by node, with the lower surface first.
-    face, face_plane, turn
-        Which face each was cut from; its plane; 1 where it is counter-clockwise seen from above that, else -1.
+    face, face_plane, turn, face_lo, face_hi
+        Which face each was cut from; its plane; 1 where it is counter-clockwise seen from above that, else -1; its box.
     """
 
     def __init__(self, faces, most, check):
@@ -93,8 +93,9 @@ class Bsp:
         self.first[there] = place
         self.more = np.append(owner[1:] == owner[:-1], False)[: len(owner)]
         self.lo, self.hi = np.full((nodes, 3), np.inf), np.full((nodes, 3), -np.inf)
-        np.minimum.at(self.lo, owner, self.points.min(axis=1, initial=np.inf))
-        np.maximum.at(self.hi, owner, self.points.max(axis=1, initial=-np.inf))
+        self.face_lo, self.face_hi = self.points.min(axis=1, initial=np.inf), self.points.max(axis=1, initial=-np.inf)
+        np.minimum.at(self.lo, owner, self.face_lo)
+        np.maximum.at(self.hi, owner, self.face_hi)
         for k in range(nodes - 1, -1, -1):
             for child in (self.below[k], self.above[k]):
                 if child >= 0:

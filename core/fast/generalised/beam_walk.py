@@ -99,7 +99,7 @@ class Walk:
         self.beam, self.source, self.points, self.count = beam, source, points, count
         self.top, self.sight = np.full(len(beam), -1), self._sight(beam, points)
         if len(self.bsp):
-            root = np.flatnonzero(self._inside(np.arange(len(beam)), np.zeros(len(beam), np.int64)))
+            root = np.flatnonzero(self._inside(np.arange(len(beam)), self.bsp.lo[0], self.bsp.hi[0]))
             self._push(root, np.zeros(len(root), np.int64))
         while True:
             self.check()
@@ -155,9 +155,8 @@ class Walk:
         planes = x - lo[:, :1] * w, hi[:, :1] * w - x, y - lo[:, 1:] * w, hi[:, 1:] * w - y, self.beams.start[beam]
         return np.stack(planes, axis=1)
 
-    def _inside(self, piece, node):
-        """Whether the boxes of nodes reach into the half-spaces around pieces."""
-        lo, hi = self.bsp.lo[node], self.bsp.hi[node]
+    def _inside(self, piece, lo, hi):
+        """Whether boxes reach into the half-spaces around pieces."""
         plane = self.sight[piece]
         centre, half = 0.5 * (lo + hi), 0.5 * (hi - lo)
         normal = plane[..., :3]
@@ -180,14 +179,19 @@ class Walk:
     def _push_node(self, piece, node):
         """Put nodes in front that pieces can meet; -1 is none."""
         some = np.flatnonzero(node >= 0)
-        some = some[self._inside(piece[some], node[some])]
+        some = some[self._inside(piece[some], self.bsp.lo[node[some]], self.bsp.hi[node[some]])]
         self._push(piece[some], node[some])
 
     def _meet(self, piece, face):
         """Faces: pieces are cut by their outlines."""
-        bsp, beam = self.bsp, self.beam[piece]
+        bsp = self.bsp
         more = np.flatnonzero(bsp.more[face])
         self._push(piece[more], len(bsp) + face[more] + 1)
+        near = np.flatnonzero(self._inside(piece, bsp.face_lo[face], bsp.face_hi[face]))
+        if not len(near):
+            return
+        piece, face = piece[near], face[near]
+        beam = self.beam[piece]
         self.tests += np.bincount(beam, minlength=len(self.beams))
         line, seen, h = outlines(
             self.beams, beam, bsp.points[face], bsp.count[face], bsp.face_plane[face], bsp.turn[face]

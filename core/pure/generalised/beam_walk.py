@@ -86,6 +86,9 @@ class Walk:
                 if isinstance(task, Node):
                     todo.append((beam, source, points, self._entered(beam, points, task, rest)))
                     continue
+                if not inside(beam, box(points), task):
+                    todo.append((beam, source, points, rest))
+                    continue
                 key = id(beam), id(task)
                 if key not in outlines:
                     outlines[key] = outline(beam, task.points, task.plane, task.turn)
@@ -121,8 +124,8 @@ class Walk:
         return (seen, parts) if seen else ([], [points])
 
 
-def inside(beam, around, node):
-    """Whether a node's box reaches into the half-spaces around a piece, given by its rectangle."""
+def inside(beam, around, thing):
+    """Whether the box of a node or face reaches into the half-spaces around a piece, given by its rectangle."""
     (x0, y0), (x1, y1) = around
     x, y, _, w = beam.map
     planes = [
@@ -132,8 +135,8 @@ def inside(beam, around, node):
         [y1 * b - a for a, b in zip(y, w)],
         beam.start,
     ]
-    centre = [0.5 * (l + h) for l, h in zip(node.lo, node.hi)]
-    half = [0.5 * (h - l) for l, h in zip(node.lo, node.hi)]
+    centre = [0.5 * (l + h) for l, h in zip(thing.lo, thing.hi)]
+    half = [0.5 * (h - l) for l, h in zip(thing.lo, thing.hi)]
     for plane in planes:
         reach = sum(abs(p) * h for p, h in zip(plane, half))
         # Rounding, of numbers as large as the map's.
