@@ -177,10 +177,16 @@ def test_growth_fits_exponents(monkeypatch):
 
 
 def test_the_bar_of_the_bench():
-    row = {"technique": "bvh", "x_mathutils_primary": 2.5, "x_mathutils_secondary": 1.9}
-    assert not bench._bar(row, {"trace_peak": 1e6})["met"]
-    row["x_mathutils_secondary"] = 2.0
-    assert bench._bar(row, {"trace_peak": 1e6})["met"] and not bench._bar(row, {"trace_peak": 3e8})["met"]
+    def bar(primary, secondary, most, size=1e6):
+        row = {"technique": "bvh", "x_mathutils_primary": primary, "x_mathutils_secondary": secondary}
+        row |= {f"spread_{kind}": [1.0, most] for kind in ("primary", "secondary")}
+        found = bench._bar(row, {"trace_peak": size})
+        return found["met"], found["doubtful"]
+
+    assert bar(2.1, 2.5, 3.0) == (True, False)
+    assert bar(1.9, 2.5, 3.0) == (False, True)
+    assert bar(1.5, 1.9, 1.9) == (False, False)
+    assert bar(2.1, 2.5, 3.0, 3e8) == (False, False)
 
 
 # --- wrong calls ------------------------------------------------------------------------------------------------------
