@@ -10,8 +10,8 @@ SMALLER = 0.06
 COVERED = (1.0, 0.05, 0.01)
 #: Of cells that are pointed at, and those that share their list.
 POINTED = (1.0, 0.35, 0.0)
-#: Texels of a cell: two corners of a box, four of a flat cell, twelve of a piece of a plane; and the colour.
-TEXELS = {"quad": 5, "polygon": 13}
+#: Texels of a cell: two corners of a box, four of a flat cell or of a beam's side, twelve of a piece of a plane; and the colour.
+TEXELS = {"quad": 5, "beam": 5, "polygon": 13}
 
 #: Sixteen equidistant colours of viridis (van der Walt and Smith 2015, CC0), sRGB: equal steps look equally large.
 VIRIDIS = ("440154", "481a6c", "472f7d", "414487", "39568c", "31688e", "2a788e", "23888e",
@@ -114,15 +114,20 @@ def boxes(cells, levels=None, leaves_only=False, empty=True, by="LEVEL", opacity
     texels : ndarray, shape (rows, k * CELLS_PER_ROW, 4), float32
         RGBA texels, k = 3 a box: lower corner, upper corner, linear colour with opacity; k = 5 a flat cell: its four corners, and
         the colour; k = 13 a piece of a plane: twelve corners, and the colour. Cells follow each other along a row, so that cell i starts at texel k i.
+        Of beams, all sides, each a flat cell.
     n : int
         Cells in it.
     """
     index = select(cells, levels, leaves_only, empty)
+    if cells.volume == "beam":
+        index, corners = _sides(cells, index)
     n, k = len(index), TEXELS.get(cells.volume, 3)
     texels = np.empty((max(1, -(-n // CELLS_PER_ROW)) * CELLS_PER_ROW, k, 4), np.float32)
     texels[n:] = 0.0
     every = n == len(cells)
-    if k > 3:
+    if cells.volume == "beam":
+        texels[:n, :4, :3] = corners
+    elif k > 3:
         corners = cells.shape.reshape(-1, k - 1, 3)[index]
         texels[:n, :k - 1, :3] = corners + (SMALLER if k == 5 else 0.0) * (corners.mean(axis=1, keepdims=True) - corners)
     elif cells.volume == "slab":
@@ -139,6 +144,15 @@ def boxes(cells, levels=None, leaves_only=False, empty=True, by="LEVEL", opacity
     if len(pointed):
         texels[:n, k - 1][np.isin(index, pointed)] = *POINTED, 1.0
     return texels.reshape(-1, k * CELLS_PER_ROW, 4), n
+
+
+def _sides(cells, index):
+    """The sides of some beams: which beam each is of, and its corners, shape (m, 4, 3), as of flat cells."""
+    ends = cells.shape.reshape(len(cells), 2, -1, 3)[index]
+    following = np.roll(ends, -1, axis=2)
+    beam, side = np.nonzero((ends[:, 1] != following[:, 1]).any(axis=2))
+    corners = np.stack([ends[:, 0], following[:, 0], ends[:, 1], following[:, 1]], axis=2)[beam, side]
+    return index[beam], corners
 
 
 def at_pointer(cells, origin, direction, levels=None, empty=True):

@@ -6,6 +6,7 @@ import gpu
 import numpy as np
 import pytest
 from bl_ext.user_default.rayscope.addon.show import overlay, overlay_data
+from bl_ext.user_default.rayscope.core import Camera, Material, Mesh, Object, Scene, build
 from bl_ext.user_default.rayscope.core.hits import Cells
 from mathutils import Matrix
 
@@ -227,3 +228,46 @@ def test_slabs_are_drawn_apart_and_planes_by_their_corners():
     texels, n = overlay_data.boxes(planes, by="COUNT")
     assert texels.shape[1] == 13 * overlay_data.CELLS_PER_ROW and n == 3
     np.testing.assert_allclose(texels.reshape(-1, 13, 4)[:3, :12, :3], pieces, rtol=1e-6)
+
+
+def mirror_and_wall():
+    """An eye at the left that looks down at a mirror on the ground; a wall at the right, seen in the mirror."""
+    square = [(0, 1, 2), (0, 2, 3)]
+    mirror = Mesh([(-0.2, -0.5, -0.5), (0.2, -0.5, -0.5), (0.2, 0.5, -0.5), (-0.2, 0.5, -0.5)], square)
+    wall = Mesh([(0.8, -3, -0.5), (0.8, 3, -0.5), (0.8, 3, 3), (0.8, -3, 3)], square)
+    camera = Camera.look_at((-0.8, 0.0, 0.3), (0.0, 0.0, -0.5), angle=0.3)
+    return Scene([Object("mirror", mirror, materials=(Material(mirror=1.0),)), Object("wall", wall)], camera=camera)
+
+
+def test_beams_are_drawn_from_the_eye_to_the_mirror_and_on():
+    cells = build(mirror_and_wall(), "beams", levels=1).cells()
+    assert cells.volume == "beam" and set(cells.level) == {0, 1}
+    # Seen from the side, along y: x to the right, z upwards.
+    side = Matrix(((1, 0, 0, 0), (0, 0, 1, 0), (0, 0.01, 0, 0), (0, 0, 0, 1)))
+    drawn = {}
+    for level in (0, 1):
+        texels, n = overlay_data.boxes(cells, levels=(level, level))
+        assert n >= 4 and np.isfinite(texels).all()
+        drawn[level] = with_gpu(lambda: overlay.picture(np.zeros((200, 200, 4)), texels, n, side))[..., :3].max(axis=-1) > 0.0
+
+    def lit(level, x, z, reach=3):
+        i, j = int(100 + 100 * x), int(100 + 100 * z)
+        return drawn[level][j - reach:j + reach + 1, i - reach:i + reach + 1].any()
+
+    assert lit(0, -0.8, 0.3), "beams begin at the eye"
+    assert not drawn[0][:45].any(), "and end at the mirror"
+    assert not lit(1, -0.8, 0.3) and not lit(1, -0.4, -0.1), "what the mirror sends on begins there"
+    rows, columns = np.nonzero(drawn[1])
+    assert columns.min() > 75 and 176 < columns.max() < 184, "and ends at the wall"
+    assert 47 <= rows.min() <= 53 and rows.max() > 90, "from the ground upwards"
+
+
+def test_sides_of_beams_as_flat_cells():
+    cells = build(mirror_and_wall(), "beams", levels=0).cells()
+    texels, n = overlay_data.boxes(cells, by="COST", opacity=0.5)
+    sides = texels.reshape(-1, 5, 4)[:n]
+    assert (sides[:, 4, 3] == 0.5).all()
+    np.testing.assert_allclose(sides[:, :2, :3], np.broadcast_to((-0.8, 0.0, 0.3), (n, 2, 3)), atol=1e-6)
+    # Each far edge ends where the next one begins: closed outlines.
+    ends = {tuple(np.round(p, 5)) for p in sides[:, 2, :3]}
+    assert ends == {tuple(np.round(p, 5)) for p in sides[:, 3, :3]}
