@@ -289,16 +289,20 @@ OCCLUDERS = {
 }
 
 
+#: Triangles behind the occluder.
+SMALL = 100
+
+
 def behind(kind):
     """An occluder, and many small triangles behind it, seen from a light and a camera above; rays from there to the light."""
     rng = np.random.default_rng(0)
-    corners = (rng.uniform(-4, 4, (200, 1, 3)) * (1, 1, 0.4) - (0.0, 0.0, 4.0) + 0.3 * rng.normal(size=(200, 3, 3))).reshape(-1, 3)
+    corners = (rng.uniform(-4, 4, (SMALL, 1, 3)) * (1, 1, 0.4) - (0.0, 0.0, 4.0) + 0.3 * rng.normal(size=(SMALL, 3, 3))).reshape(-1, 3)
     occluder = OCCLUDERS[kind]
-    scene = Scene.from_triangles(corners, np.arange(600).reshape(-1, 3))
+    scene = Scene.from_triangles(corners, np.arange(3 * SMALL).reshape(-1, 3))
     scene.objects.append(Object("occluder", Shapes([occluder])))
     scene.camera = Camera.look_at((0.1, 0.2, 4.0), (0.0, 0.0, 0.0), up=(0.0, 1.0, 0.0))
     scene.lights = [Light("lamp", "point", (1.0,) * 3, position=(0.1, 0.2, 4.0)), Light("sun", "sun", (1.0,) * 3, direction=(0.1, 0.05, -1.0))]
-    return scene, np.concatenate([rng.uniform(-4, 4, (100, 3)) - (0, 0, 2.0), corners[:40]])
+    return scene, np.concatenate([rng.uniform(-4, 4, (60, 3)) - (0, 0, 2.0), corners[:20]])
 
 
 @pytest.mark.parametrize("core, more", [(core, more) for core in CORES for more in ({"faces": "adaptive"}, {"faces": "uniform", "z_buffer": True, "resolution": 12})],
@@ -318,14 +322,14 @@ def test_full_occluders_end_lists(kind, core, more):
     if core == "fast":
         lists = [face for b in buffers for face in (b.cube.faces.values() if hasattr(b, "cube") else [b.lists])]
         covered = [(face, cell) for face in lists for cell in np.flatnonzero(face.covered >= 0)]
-        assert 200 in {int(face.feet.item[face.covered[cell]]) for face, cell in covered}
+        assert SMALL in {int(face.feet.item[face.covered[cell]]) for face, cell in covered}
         # What ends a list is in it.
         assert all(face.covered[cell] in face.entry[face.start[cell]:face.start[cell + 1]] for face, cell in covered if hasattr(face.grid, "du"))
-        lengths = [face.start[cell + 1] - face.start[cell] for face, cell in covered if face.feet.item[face.covered[cell]] == 200]
+        lengths = [face.start[cell + 1] - face.start[cell] for face, cell in covered if face.feet.item[face.covered[cell]] == SMALL]
     else:
         cells = [cell for b in buffers for _, root in b.faces.values() for cell in root.walk() if not cell.children and cell.covered >= 0]
         assert all(cell.covered in {item for _, item in cell.entries} for cell in cells)
-        lengths = [len(cell.entries) for cell in cells if cell.covered == 200]
+        lengths = [len(cell.entries) for cell in cells if cell.covered == SMALL]
     assert len(lengths) > 6 and np.mean(lengths) < 2.0
 
 
@@ -426,3 +430,21 @@ def test_lists_name_all_that_a_finer_z_buffer_sees(name):
                     lists.start = np.zeros_like(lists.start)
                     seen += len(lists.unlisted(index.primitives))
         assert seen
+
+
+@pytest.mark.parametrize("core", CORES)
+def test_lights_in_awkward_places(core):
+    """Inside a solid, on a surface, at the camera: shadows as without the techniques."""
+    from rayscope.core import trace
+    scene = jittered_sphere(np.random.default_rng(0), rows=6)
+    scene.objects.append(Object("solids", Shapes([solids.box((-3, -3, -1.4), (3, 3, -1.2)), solids.sphere((1.6, 0.2, 0.0), 0.4), solids.sphere((-1.6, 0, 0), 0.3)])))
+    scene.camera = Camera.look_at((0.5, -4.0, 1.5), (0.0, 0.0, 0.0))
+    eye = tuple(scene.camera.frame()[0].tolist())
+    places = {"inside": (1.6, 0.25, 0.1), "on the surface": (-1.3, 0.0, 0.0), "on a corner": (3.0, 3.0, -1.2), "at the camera": eye}
+    scene.lights = [Light(name, "point", (20.0,) * 3, position=place) for name, place in places.items()]
+    size = (48, 36) if core == "fast" else (12, 9)
+    plain = trace(scene, core=core, size=size, depth=0).image
+    for shadow in ("light-buffer", ("light-buffer", {"faces": "adaptive", "resolution": 32}), ("light-buffer", {"faces": "uniform", "z_buffer": True, "resolution": 8}),
+                   "ray-coherence"):
+        assert np.array_equal(plain, trace(scene, core=core, size=size, depth=0, primary="image-directory", shadow=shadow).image), shadow
+    assert plain[..., :3].max() > 0.1
