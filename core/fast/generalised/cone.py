@@ -6,6 +6,9 @@ import numpy as np
 
 from ..tracing.vectors import dot
 
+#: Heights above a plane, relative to the distance along it, that are rounding.
+FLAT = 1e-9
+
 
 class Cones:
     """n cones: the points o + w (d + s e + t f), (s, t) in the aperture, t_min <= w <= t_max.
@@ -17,22 +20,32 @@ class Cones:
     o, d, e, f : ndarray, shape (3, n)
     t_min, t_max : ndarray, shape (n,)
     parallel : ndarray, shape (n,), bool
+    start, away : ndarray, shape (3, n)
+        Point where the axis starts on a surface, and normal of it, on the cone's side: only what is beyond that plane is met;
+        zero for cones that start at no surface.
     leaving : ndarray, shape (2, n), int64
-        Object and primitive of the surface where it starts, which it does not meet again; -1 for none.
+        Object and primitive of that surface, which it does not meet again; -1 for none.
     inside : ndarray, shape (n,), bool
         It starts within that primitive, and meets its far side.
     disc : bool
         The aperture: the unit disc, or the square from (-1, -1) to (1, 1).
     """
 
-    COLUMNS = ("o", "d", "e", "f", "t_min", "t_max", "parallel", "leaving", "inside")
+    COLUMNS = ("o", "d", "e", "f", "t_min", "t_max", "parallel", "start", "away", "leaving", "inside")
 
-    def __init__(self, o, d, e, f, t_min, t_max, parallel, leaving, inside, disc=True):
+    def __init__(self, o, d, e, f, t_min, t_max, parallel, start, away, leaving, inside, disc=True):
         self.o, self.d, self.e, self.f, self.t_min, self.t_max = o, d, e, f, t_min, t_max
-        self.parallel, self.leaving, self.inside, self.disc = parallel, leaving, inside, disc
+        self.parallel, self.start, self.away = parallel, start, away
+        self.leaving, self.inside, self.disc = leaving, inside, disc
 
     def __len__(self):
         return self.o.shape[1]
+
+    @classmethod
+    def free(cls, o, d, e, f, t_min, t_max, parallel, disc):
+        """Cones that start at no surface."""
+        n = o.shape[1]
+        return cls(o, d, e, f, t_min, t_max, parallel, o, np.zeros((3, n)), np.full((2, n), -1), np.zeros(n, bool), disc)
 
     def take(self, index):
         """Some of the cones."""
@@ -62,6 +75,12 @@ class Cones:
         shift = s * self.e[:, cone] + t * self.f[:, cone]
         parallel = self.parallel[cone]
         return self.o[:, cone] + np.where(parallel, shift, 0.0), self.d[:, cone] + np.where(parallel, 0.0, shift)
+
+    def height(self, cone, point):
+        """How far points, one of each of the cones given, lie beyond the planes that these leave; in those planes, 0."""
+        p, away = point - self.start[:, cone], self.away[:, cone]
+        height = dot(away, p)
+        return np.where(np.abs(height) > FLAT * np.abs(p).max(axis=0, initial=0.0), height, 0.0)
 
     def spread(self):
         """How far points of the cones are from their axes, along x, y and z, at most: at w = 0, and more for each w."""

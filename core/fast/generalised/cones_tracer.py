@@ -21,6 +21,10 @@ from .outlines import points
 PARALLEL = 1e4
 #: Least angle, in radians, of a cone that widens.
 NARROW = 1e-7
+#: Pieces that cover less of a cone, relative to the one that covers most of it, are not seen.
+SCRAP = 1e-3
+#: Cones go on only with so much weight in their pixel: they branch more than rays.
+LEAST_WEIGHT = 2e-5
 #: Cosine below which a cone's footprint on a surface is not made longer.
 GRAZING = 0.05
 
@@ -38,6 +42,7 @@ class ConeTracer(FootprintTracer):
 
     def __init__(self, scene, structures, *arguments, **more):
         super().__init__(scene, structures, *arguments, **more)
+        self.threshold = max(self.threshold, LEAST_WEIGHT)
         self.gloss = structures["primary"].parameters["gloss"]
         lo, hi = scene.bounds()
         self.extent = float(np.abs(hi - lo).max())
@@ -71,7 +76,10 @@ class ConeTracer(FootprintTracer):
         total = np.add.reduceat(seen, start)
         full = (nearest < np.inf).all(axis=1)
         scale = np.where(full | (total > 1.0), 1.0 / np.where(total > 0.0, total, 1.0), 1.0)
-        share[rows] = seen * scale[group]
+        seen = seen * scale[group]
+        # Scraps at edges are left to the others, or rays behind surfaces would be followed for nothing.
+        kept = np.where(seen >= SCRAP * np.maximum.reduceat(seen, start)[group], seen, 0.0)
+        share[rows] = kept * (np.add.reduceat(seen, start) / np.maximum(np.add.reduceat(kept, start), 1e-300))[group]
         hidden = np.flatnonzero((part < 1.0) & (won > 0.0))
         s[rows[hidden]] = (credit[hidden] @ ps) / won[hidden]
         t[rows[hidden]] = (credit[hidden] @ pt) / won[hidden]
@@ -101,7 +109,8 @@ class ConeTracer(FootprintTracer):
         else:
             e, f = (light.radius * a for a in frame(unit(to)))
         cones = Cones(
-            o, d, e, f, np.zeros(n), t_max, np.zeros(n, bool), surface.place[:, which], ~surface.outside[which],
+            o, d, e, f, np.zeros(n), t_max, np.zeros(n, bool), point, surface.normal[:, which], surface.place[:, which],
+            ~surface.outside[which],
             light.kind != "area" or light.shape == "ellipse",
         )
         outlines, sampled, n_it, n_ts = structure.within(cones)
@@ -160,7 +169,9 @@ class ConeTracer(FootprintTracer):
         area = _length(np.cross(e, f, axis=0))
         if kind == TRANSPARENT:
             t_min = t + np.sqrt(area / dot(old.d, old.d))
-            cones = Cones(old.o, old.d, old.e, old.f, t_min, old.t_max, old.parallel, part.place, part.outside)
+            cones = Cones(
+                old.o, old.d, old.e, old.f, t_min, old.t_max, old.parallel, o, -part.normal, part.place, part.outside
+            )
         else:
             spread = [
                 self._turned(wave, ray, part, kind, direction, wide, across)
@@ -176,11 +187,11 @@ class ConeTracer(FootprintTracer):
             x, y = (np.sqrt(area) * a for a in frame(direction))
             cones = Cones(
                 o - back * direction, direction, np.where(parallel, x, spread[0]), np.where(parallel, y, spread[1]),
-                back if kind == REFLECTED else back + np.sqrt(area), t_max + back, parallel, part.place,
-                part.outside != (kind == REFLECTED),
+                back if kind == REFLECTED else back + np.sqrt(area), t_max + back, parallel, o,
+                part.normal if kind == REFLECTED else -part.normal, part.place, part.outside != (kind == REFLECTED),
             )
         depth = wave.depth[ray] + (kind != TRANSPARENT)
-        return ConeWave(cones, o, weight, wave.pixel[ray], depth, np.full(len(ray), kind, np.uint8), key)
+        return ConeWave(cones, weight, wave.pixel[ray], depth, np.full(len(ray), kind, np.uint8), key)
 
     def _turned(self, wave, ray, part, kind, direction, wide, across):
         """By how much the direction changes from a cone's axis to its edge.

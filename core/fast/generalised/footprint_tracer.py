@@ -26,15 +26,13 @@ class ConeWave(Wave):
     Attributes
     ----------
     cones : Cones
-    start : ndarray, shape (3, n)
-        Where the axes start.
     item : ndarray, shape (n,)
         Number of the primitive that was met; -1 where none was, or where it is not known yet.
     """
 
-    def __init__(self, cones, start, weight, pixel, depth, kind, key, item=None):
+    def __init__(self, cones, weight, pixel, depth, kind, key, item=None):
         super().__init__(cones.o, cones.d, cones.t_max, weight, pixel, depth, kind, key, cones.leaving, t_min=cones.t_min)
-        self.cones, self.start = cones, start
+        self.cones = cones
         self.item = np.full(len(pixel), -1) if item is None else item
 
     @classmethod
@@ -42,18 +40,18 @@ class ConeWave(Wave):
         """One wave from several."""
         if len(waves) == 1:
             return waves[0]
-        start, weight, pixel, depth, kind, item = (
+        weight, pixel, depth, kind, item = (
             np.concatenate([getattr(w, name) for w in waves], axis=-1)
-            for name in ("start", "weight", "pixel", "depth", "kind", "item")
+            for name in ("weight", "pixel", "depth", "kind", "item")
         )
         key = None if waves[0].key is None else np.concatenate([w.key for w in waves])
-        return cls(Cones.joined([w.cones for w in waves]), start, weight, pixel, depth, kind, key, item)
+        return cls(Cones.joined([w.cones for w in waves]), weight, pixel, depth, kind, key, item)
 
     def take(self, index):
         """Some of the rays."""
         key = None if self.key is None else self.key[index]
         return ConeWave(
-            self.cones.take(index), self.start[:, index], self.weight[:, index], self.pixel[index], self.depth[index],
+            self.cones.take(index), self.weight[:, index], self.pixel[index], self.depth[index],
             self.kind[index], key,
         )
 
@@ -85,13 +83,9 @@ class FootprintTracer(Whitted):
             camera.rays(x + 0.5 + dx, y + 0.5 + dy, self.size)[which].T - (o, d)[which]
             for dx, dy in ((reach, 0.0), (0.0, reach))
         )
-        cones = Cones(
-            o, d, e, f, np.full(n, float(camera.near)), np.full(n, float(camera.far)), np.full(n, parallel),
-            np.full((2, n), -1), np.zeros(n, bool), self.disc,
-        )
-        wave = ConeWave(
-            cones, o, np.ones((3, n)), np.arange(n), np.zeros(n, np.int32), np.full(n, PRIMARY, np.uint8), key
-        )
+        near, far = np.full(n, float(camera.near)), np.full(n, float(camera.far))
+        cones = Cones.free(o, d, e, f, near, far, np.full(n, parallel), self.disc)
+        wave = ConeWave(cones, np.ones((3, n)), np.arange(n), np.zeros(n, np.int32), np.full(n, PRIMARY, np.uint8), key)
         return self.followed(wave, n, not np.any(sample))
 
     def _met(self, wave):
@@ -181,22 +175,21 @@ def _rays(wave):
     """The same cones with their apexes where they start: of rays beside their axes some might meet the surface itself."""
     c = wave.cones
     begun = c.leaving[0] >= 0
-    cones = Cones(
-        np.where(begun, wave.start, c.o), c.d, c.e, c.f, np.where(begun, 0.0, c.t_min), np.where(begun, c.t_max - c.t_min, c.t_max),
-        c.parallel, c.leaving, c.inside, c.disc,
-    )
-    return ConeWave(cones, wave.start, wave.weight, wave.pixel, wave.depth, wave.kind, wave.key)
+    cones = c.take(slice(None))
+    cones.o = np.where(begun, c.start, c.o)
+    cones.t_min, cones.t_max = np.where(begun, 0.0, c.t_min), np.where(begun, c.t_max - c.t_min, c.t_max)
+    return ConeWave(cones, wave.weight, wave.pixel, wave.depth, wave.kind, wave.key)
 
 
 def _narrowed(wave, which, s, t, share, item=None):
     """Rays through (s, t) of some of a wave's cones, with as much of the cones' area about them as their share."""
-    c = wave.cones.take(which)
-    o, d = wave.cones.rays(which, s, t)
+    cones = wave.cones.take(which)
+    cones.o, cones.d = wave.cones.rays(which, s, t)
     width = np.sqrt(share)
-    cones = Cones(o, d, c.e * width, c.f * width, c.t_min, c.t_max, c.parallel, c.leaving, c.inside, c.disc)
+    cones.e, cones.f = cones.e * width, cones.f * width
     key = None if wave.key is None else wave.key[which]
     return ConeWave(
-        cones, wave.start[:, which], wave.weight[:, which] * share, wave.pixel[which], wave.depth[which], wave.kind[which], key,
+        cones, wave.weight[:, which] * share, wave.pixel[which], wave.depth[which], wave.kind[which], key,
         item,
     )
 

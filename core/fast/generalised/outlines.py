@@ -45,8 +45,8 @@ class Pieces:
         Row among the triangles, or ~row among the spheres.
     corners : ndarray, shape (3, 3, triangles)
         First axis: the corner.
-    inverse, origin : ndarray, shapes (3, 3, spheres), (3, spheres)
-        World to unit space.
+    matrix, inverse, origin : ndarray, shapes (3, 3, spheres), (3, 3, spheres), (3, spheres)
+        Unit to world space, and back.
     kinds : list of str
         Names of the kinds that are not supported.
     """
@@ -54,7 +54,8 @@ class Pieces:
     def __init__(self, primitives, supported):
         self.count = np.zeros(primitives.n, np.int64)
         self.place = np.full((2, primitives.n), -1, np.int64)
-        corners, inverse, origin, number, self.kinds = [np.zeros((3, 3, 0))], [np.zeros((3, 3, 0))], [np.zeros((3, 0))], [], []
+        corners, matrix, inverse = ([np.zeros((3, 3, 0))] for _ in range(3))
+        origin, number, self.kinds = [np.zeros((3, 0))], [], []
         n_triangles = n_spheres = 0
         for kind, start in zip(primitives.kinds, primitives.starts):
             some = np.s_[start : start + kind.n]
@@ -63,6 +64,7 @@ class Pieces:
                 continue
             self.place[:, some] = kind.object_of, kind.primitive_of
             if kind.KIND == "sphere":
+                matrix.append(kind.matrix)
                 inverse.append(kind.inverse)
                 origin.append(kind.origin)
                 self.count[some] = 1
@@ -77,7 +79,9 @@ class Pieces:
             n_triangles += own.shape[2]
         self.first = np.cumsum(self.count) - self.count
         self.number = np.concatenate([np.zeros(0, np.int64), *number])
-        self.corners, self.inverse, self.origin = (np.concatenate(a, axis=-1) for a in (corners, inverse, origin))
+        self.corners, self.matrix, self.inverse, self.origin = (
+            np.concatenate(a, axis=-1) for a in (corners, matrix, inverse, origin)
+        )
 
     def outlines(self, cones, cone, item):
         """What pieces look like.
@@ -107,7 +111,7 @@ class Pieces:
             out.measure_triangles(self.corners[:, :, number[flat]])
         if len(round_):
             which = ~number[round_]
-            out.measure_spheres(self.inverse[:, :, which], self.origin[:, which], far_side[round_])
+            out.measure_spheres(*(a[..., which] for a in (self.matrix, self.inverse, self.origin)), far_side[round_])
         return out
 
 
@@ -133,7 +137,7 @@ class Outlines:
         A point of the aperture that it covers: the middle of its part.
     flat, round_ : ndarray
         Which are triangles, and which spheres.
-    lines : ndarray, shape (triangles, 5, 3)
+    lines : ndarray, shape (triangles, 6, 3)
         The triangles' half planes, inside positive; those of zeros count for nothing.
     plane : ndarray, shape (4, triangles)
         Of x, y, w, and their sum.
@@ -171,7 +175,7 @@ class Outlines:
         parallel = cones.parallel[cone]
         x, y, w = np.stack([cones.local(c, cone) for c in corners], axis=1)
         q = np.where(parallel, 1.0, w)
-        lines = np.zeros((len(cone), 5, 3))
+        lines = np.zeros((len(cone), 6, 3))
         for k, (i, j) in enumerate(((1, 2), (2, 0), (0, 1))):
             lines[:, k, 0] = y[i] * q[j] - q[i] * y[j]
             lines[:, k, 1] = q[i] * x[j] - x[i] * q[j]
@@ -189,11 +193,20 @@ class Outlines:
             rate = -sign * (p + (1.0 - p) * limit)
             line = np.stack([rate * nx, rate * ny, sign * (total - limit * nw)], axis=-1)
             lines[:, k] = np.where(some[:, None], line, 0.0)
+        there = turn != 0.0
+        bound = np.flatnonzero(cones.away[:, cone].any(axis=0))
+        if len(bound):
+            # Heights above the plane left are interpolated between corners as everything else is.
+            heights = np.stack([cones.height(cone[bound], c[:, bound]) for c in corners])
+            there[bound] &= (heights > 0.0).any(axis=0)
+            cut = (heights < 0.0).any(axis=0)
+            some = bound[cut]
+            lines[some, 5] = sum(h[:, None] * lines[some, k] for k, h in enumerate(heights[:, cut]))
         lines *= np.sign(turn)[:, None, None]
         self.lines = lines
-        self.share[self.flat], self.s[self.flat], self.t[self.flat] = _covered(lines, turn != 0.0, cones.disc)
+        self.share[self.flat], self.s[self.flat], self.t[self.flat] = _covered(lines, there, cones.disc)
 
-    def measure_spheres(self, inverse, origin, far_side):
+    def measure_spheres(self, matrix, inverse, origin, far_side):
         """Find conics, shares and middles of the spheres, whose maps to unit space are given."""
         cones, cone = self.cones, self.cone[self.round_]
         o, d, e, f = (
@@ -218,7 +231,11 @@ class Outlines:
         share, s, t = _chords(self.conic, np.where(parallel, 0.0, self.front), ~parallel, cones.disc)
         share, s, t = np.where(whole, 1.0, share), np.where(whole, 0.0, s), np.where(whole, 0.0, t)
         w = self._sphere_distance(s[:, None], t[:, None])[:, 0]
-        self.share[self.round_] = np.where(np.isfinite(w), share, 0.0)
+        # The furthest point that way of a sphere behind the plane left is behind it, too.
+        away = cones.away[:, cone]
+        top = np.sqrt(sum(dot(matrix[:, c], away) ** 2 for c in range(3)))
+        behind = (dot(away, origin - cones.start[:, cone]) + top <= 0.0) & away.any(axis=0) & ~far_side
+        self.share[self.round_] = np.where(np.isfinite(w) & ~behind, share, 0.0)
         self.s[self.round_], self.t[self.round_] = s, t
 
     def distances(self, s, t):
@@ -239,7 +256,7 @@ class Outlines:
     def _triangle_distance(self, s, t):
         """w at points of the aperture, shape (triangles, k)."""
         inside = np.ones(s.shape, bool)
-        for k in range(self.lines.shape[1]):
+        for k in np.flatnonzero(self.lines.any(axis=(0, 2))):
             a, b, c = self.lines[:, k].T[..., None]
             inside &= a * s + b * t + c >= 0.0
         nx, ny, nw, total = self.plane[..., None]

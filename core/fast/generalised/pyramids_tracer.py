@@ -32,6 +32,7 @@ class PyramidTracer(FootprintTracer):
         begin, number = np.repeat(first, size), np.repeat(size, size)
         planes = self._nearness(outlines)
         owner = np.arange(len(outlines))
+        least, most = corners.min(axis=1), corners.max(axis=1)
         for j in range(int(size.max(initial=1)) if (size > 1).any() else 0):
             other = begin[owner] + j
             there = (j < number[owner]) & (other != owner)
@@ -41,7 +42,7 @@ class PyramidTracer(FootprintTracer):
             # Of two at the same place the first is seen; what lies behind all over the pixel hides nothing.
             reach = np.abs(line[:, 0]) + np.abs(line[:, 1])
             hides = there & np.where(same, other < owner, line[:, 2] > -reach)
-            hides &= count >= 3
+            hides &= (least[other] < most[owner]).all(axis=1) & (most[other] > least[owner]).all(axis=1) & (count >= 3)
             some, rest = np.flatnonzero(hides), np.flatnonzero(~hides & (count >= 3))
             if not len(some):
                 continue

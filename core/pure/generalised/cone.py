@@ -6,6 +6,9 @@ from functools import cached_property
 
 from ..tracing.vectors import add, cross, dot, minus, times
 
+#: Heights above a plane, relative to the distance along it, that are rounding.
+FLAT = 1e-9
+
 
 @dataclass
 class Cone:
@@ -18,8 +21,10 @@ class Cone:
     o, d, e, f : tuple of 3 float
     t_min, t_max : float
     parallel : bool
+    start, away : tuple of 3 float, or None
+        Point where the axis starts on a surface, and normal of it, on the cone's side: only what is beyond that plane is met.
     leaving : (int, int) or None
-        Object and primitive of the surface where it starts, which it does not meet again.
+        Object and primitive of that surface, which it does not meet again.
     inside : bool
         It starts within that primitive, and meets its far side.
     disc : bool
@@ -33,6 +38,8 @@ class Cone:
     t_min: float
     t_max: float
     parallel: bool = False
+    start: tuple | None = None
+    away: tuple | None = None
     leaving: tuple | None = None
     inside: bool = False
     disc: bool = True
@@ -53,6 +60,12 @@ class Cone:
         """Origin and direction of the ray through (s, t); w counts along it, too."""
         shift = add(times(s, self.e), times(t, self.f))
         return (add(self.o, shift), self.d) if self.parallel else (self.o, add(self.d, shift))
+
+    def height(self, point):
+        """How far a point lies beyond the plane that the cone leaves; in the plane, 0."""
+        p = minus(point, self.start)
+        height = dot(self.away, p)
+        return height if abs(height) > FLAT * max(map(abs, p)) else 0.0
 
     @cached_property
     def bounds(self):

@@ -18,6 +18,10 @@ from .outlines import points
 PARALLEL = 1e4
 #: Least angle, in radians, of a cone that widens.
 NARROW = 1e-7
+#: Pieces that cover less of a cone, relative to the one that covers most of it, are not seen.
+SCRAP = 1e-3
+#: Cones go on only with so much weight in their pixel: they branch more than rays.
+LEAST_WEIGHT = 2e-5
 #: Cosine below which a cone's footprint on a surface is not made longer.
 GRAZING = 0.05
 
@@ -35,6 +39,7 @@ class ConeTracer(FootprintTracer):
 
     def __init__(self, scene, structures, *arguments, **more):
         super().__init__(scene, structures, *arguments, **more)
+        self.threshold = max(self.threshold, LEAST_WEIGHT)
         self.gloss = structures["primary"].parameters["gloss"]
         lo, hi = (corner.tolist() for corner in scene.bounds())
         self.extent = max(abs(h - l) for l, h in zip(lo, hi))
@@ -70,7 +75,12 @@ class ConeTracer(FootprintTracer):
         total = sum(share for _, share, _, _ in seen)
         full = all(w < math.inf for w in nearest)
         scale = 1.0 / total if total > 0.0 and (full or total > 1.0) else 1.0
-        return [(outline, share * scale, s, t) for outline, share, s, t in seen]
+        # Scraps at edges are left to the others, or rays behind surfaces would be followed for nothing.
+        seen = [(outline, share * scale, s, t) for outline, share, s, t in seen]
+        most = max(share for _, share, _, _ in seen)
+        kept = [piece for piece in seen if piece[1] >= SCRAP * most]
+        ratio = sum(piece[1] for piece in seen) / max(sum(piece[1] for piece in kept), 1e-300)
+        return [(outline, share * ratio, s, t) for outline, share, s, t in kept]
 
     def _transmitted(self, surface, to, reach, light):
         """Share of light that reaches a surface; by one cone to a light that has an extent."""
@@ -86,7 +96,7 @@ class ConeTracer(FootprintTracer):
         else:
             e, f = (times(light.radius, axis) for axis in frame(unit(to)))
         disc = light.kind != "area" or light.shape == "ellipse"
-        cone = Cone(o, d, e, f, 0.0, t_max, False, surface.place, not surface.outside, disc)
+        cone = Cone(o, d, e, f, 0.0, t_max, False, surface.point, surface.normal, surface.place, not surface.outside, disc)
         structure = self.probe["shadow"].structure
         outlines, sampled, n_it, n_ts = structure.within(cone)
         if sampled:
@@ -128,7 +138,8 @@ class ConeTracer(FootprintTracer):
         area = _length(cross(e, f))
         if kind == TRANSPARENT:
             t_min = t + math.sqrt(area / dot(old.d, old.d))
-            cone = replace(old, t_min=t_min, leaving=surface.place, inside=surface.outside, disc=True)
+            onward = times(-1.0, surface.normal)
+            cone = replace(old, t_min=t_min, start=o, away=onward, leaving=surface.place, inside=surface.outside, disc=True)
         else:
             spread = [
                 self._turned(path, surface, kind, direction, wide, across) for wide, across in ((old.e, e), (old.f, f))
@@ -144,10 +155,11 @@ class ConeTracer(FootprintTracer):
                 spread = [times(math.sqrt(area), a) for a in frame(direction)]
             cone = Cone(
                 minus(o, times(back, direction)), direction, *spread,
-                back if kind == REFLECTED else back + math.sqrt(area), t_max + back, parallel, surface.place,
+                back if kind == REFLECTED else back + math.sqrt(area), t_max + back, parallel, o,
+                surface.normal if kind == REFLECTED else times(-1.0, surface.normal), surface.place,
                 surface.outside != (kind == REFLECTED),
             )
-        return ConePath.along(cone, o, weight, path.depth + (kind != TRANSPARENT), kind, key)
+        return ConePath.along(cone, weight, path.depth + (kind != TRANSPARENT), kind, key)
 
     def _turned(self, path, surface, kind, direction, wide, across):
         """By how much the direction changes from a cone's axis to its edge.

@@ -28,8 +28,6 @@ class ConePath(Path):
     Attributes
     ----------
     cone : Cone
-    start : tuple of 3 float
-        Where the axis starts.
     item : int
         Number of the primitive that was met; -1 where none was, or where it is not known.
     hit : Hit or None
@@ -37,28 +35,27 @@ class ConePath(Path):
     """
 
     cone: Cone | None = None
-    start: tuple = ()
     item: int = -1
     hit: Hit | None = None
 
     @classmethod
-    def along(cls, cone, start, weight, depth, kind, key):
+    def along(cls, cone, weight, depth, kind, key):
         """The axis of a cone."""
-        return cls(cone.o, cone.d, cone.t_min, cone.t_max, weight, depth, kind, key, cone.leaving, cone, start)
+        return cls(cone.o, cone.d, cone.t_min, cone.t_max, weight, depth, kind, key, cone.leaving, cone)
 
     def narrowed(self, s, t, share):
         """The ray through (s, t), with as much of the cone's area about it as its share."""
         o, d = self.cone.ray(s, t)
         width = math.sqrt(share)
         cone = replace(self.cone, o=o, d=d, e=times(width, self.cone.e), f=times(width, self.cone.f))
-        return ConePath.along(cone, self.start, times(share, self.weight), self.depth, self.kind, self.key)
+        return ConePath.along(cone, times(share, self.weight), self.depth, self.kind, self.key)
 
     def as_ray(self):
         """The same with the apex where it starts: of rays beside the axis some might meet the surface itself."""
         if self.cone.leaving is None:
             return self
-        cone = replace(self.cone, o=self.start, t_min=0.0, t_max=self.cone.t_max - self.cone.t_min)
-        return ConePath.along(cone, self.start, self.weight, self.depth, self.kind, self.key)
+        cone = replace(self.cone, o=self.cone.start, t_min=0.0, t_max=self.cone.t_max - self.cone.t_min)
+        return ConePath.along(cone, self.weight, self.depth, self.kind, self.key)
 
 
 class FootprintTracer(Whitted):
@@ -87,7 +84,7 @@ class FootprintTracer(Whitted):
             for dx, dy in ((reach, 0.0), (0.0, reach))
         )
         cone = Cone(o, d, e, f, float(camera.near), float(camera.far), parallel, disc=self.disc)
-        return self.followed(ConePath.along(cone, o, (1.0, 1.0, 1.0), 0, PRIMARY, key), not sample)
+        return self.followed(ConePath.along(cone, (1.0, 1.0, 1.0), 0, PRIMARY, key), not sample)
 
     def _met(self, path):
         """A cone becomes a ray to each piece that it sees, and one to the background."""

@@ -97,9 +97,16 @@ class Flat(Outline):
                 lines.append((rate * n[0], rate * n[1], sign * (total - limit * n[2])))
             else:
                 lines.append((0.0, 0.0, 0.0))
+        there = turn < 0.0 or turn > 0.0
+        if cone.away:
+            # Heights above the plane left are interpolated between corners as everything else is.
+            heights = [cone.height(c) for c in corners]
+            there = there and max(heights) > 0.0
+            if min(heights) < 0.0:
+                lines.append(tuple(sum(h * line[k] for h, line in zip(heights, lines)) for k in range(3)))
         side = 1.0 if turn > 0.0 else -1.0
         self.lines = [(side * a, side * b, side * c) for a, b, c in lines]
-        if turn < 0.0 or turn > 0.0:
+        if there:
             self.share, self.s, self.t = covered(self.lines, cone.disc)
 
     def distance(self, s, t):
@@ -145,8 +152,16 @@ class Round(Outline):
             self.share = 1.0
         else:
             self.share, self.s, self.t = chords(self.conic, self.front, not cone.parallel, cone.disc)
-        if self.distance(self.s, self.t) == math.inf:
+        if self.distance(self.s, self.t) == math.inf or (not far_side and self._behind(sphere)):
             self.share = 0.0
+
+    def _behind(self, sphere):
+        """Whether it is behind the plane that the cone leaves: its furthest point that way is."""
+        if not self.cone.away:
+            return False
+        away = self.cone.away
+        top = math.sqrt(sum(dot(column, away) ** 2 for column in zip(*sphere.matrix)))
+        return dot(away, minus(sphere.origin, self.cone.start)) + top <= 0.0
 
     def distance(self, s, t):
         value, a = form(self.conic, s, t), form(self.square, s, t)

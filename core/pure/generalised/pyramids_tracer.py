@@ -23,13 +23,15 @@ class PyramidTracer(FootprintTracer):
     def visible(self, outlines):
         """See :class:`FootprintTracer`."""
         nearness = [_nearness(outline) for outline in outlines]
+        whole = [within_lines(outline.lines) for outline in outlines]
+        boxes = [_box(polygon) for polygon in whole]
         for i, outline in enumerate(outlines):
-            parts = [within_lines(outline.lines)]
+            parts = [whole[i]]
             for j, other in enumerate(outlines):
                 line = minus(nearness[j], nearness[i])
                 # Of two at the same place the first is seen; what lies behind all over the pixel hides nothing.
                 hides = line[2] > -(abs(line[0]) + abs(line[1])) if any(line) else j < i
-                if j != i and hides:
+                if j != i and hides and _overlap(boxes[i], boxes[j]):
                     lines = [*other.lines, line]
                     parts = [p for part in parts for p in clipping.subtract(part, lines)]
             total = x = y = 0.0
@@ -44,3 +46,13 @@ def _nearness(outline):
     """What is linear in (s, t) and greater the nearer a piece is: 1 / w, or -w in a parallel pyramid."""
     nx, ny, nw, total = outline.plane
     return (nx / nw, ny / nw, -total / nw) if outline.cone.parallel else (nx / total, ny / total, nw / total)
+
+
+def _box(polygon):
+    """Least and greatest coordinates; of no polygon, nothing."""
+    return tuple((min(values), max(values)) for values in zip(*polygon))
+
+
+def _overlap(a, b):
+    """Whether boxes have an area in common."""
+    return bool(a and b) and all(low < most and high > least for (low, high), (least, most) in zip(a, b))

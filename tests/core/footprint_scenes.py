@@ -1,0 +1,76 @@
+"""Scenes for techniques that trace pixels as a whole."""
+
+import math
+
+import numpy as np
+
+from rayscope.core import Camera, Light, Material, Mesh, Object, Scene, World, solids
+
+
+def lit(*more, radius=0.4, mirror=0.7, lights=None, wall=None):
+    """A ball on a floor before a wall, under a soft light; `more` are further solids."""
+    floor = Mesh(np.array([(-9, -9, 0), (9, -9, 0), (0, 15, 0)], float), [(0, 1, 2)])
+    back = Mesh(np.array([(-2, 2, 0), (3, 2, 0), (0, 3, 4)], float), [(0, 1, 2)])
+    return Scene(
+        [Object("floor", floor), Object("wall", back, materials=(wall or Material("wall", mirror=mirror),))],
+        lights or [Light("lamp", "point", (50, 50, 50), (3, -3, 4), radius=radius)],
+        Camera.look_at((0, -6, 3), (0, 0, 0.6), angle=math.radians(40), aspect=4 / 3),
+        World((0.2, 0.3, 0.5)),
+        solids=[solids.sphere((0, 0, 0.7), 0.7), *more],
+    )
+
+
+def with_area(shape):
+    """The same under an area light."""
+    axes = ((0.8, 0.8, 0.0), (0.5, -0.5, 0.6))
+    return lit(
+        mirror=0.0,
+        lights=[Light("a", "area", (20, 20, 20), (2, -2, 4), direction=(-0.4, 0.4, -0.8), axes=axes, shape=shape)],
+    )
+
+
+def with_glass():
+    """The same with a ball of glass, one drawn out and turned, and a sun."""
+    scene = lit(lights=[Light("sun", "sun", (2, 2, 2), direction=(-0.5, 0.4, -0.7), radius=0.1)])
+    glass = Material("glass", base=(0.9, 1, 0.9), diffuse=0.05, ambient=0.05, transmission=0.9, mirror=0.1, ior=1.4)
+    turned = np.array([[0.5, 0.6, 0, 1.5], [-0.6, 0.5, 0, -1], [0, 0, 0.8, 0.1], [0, 0, 0, 1.0]])
+    ball = Scene(solids=[solids.sphere((-1.2, -1, 0.6), 0.6)]).objects[0].geometry
+    scene.objects += [Object("glass", ball, materials=(glass,)), Object("egg", ball, turned, (Material("egg", (0.2, 0.8, 0.3)),))]
+    return scene
+
+
+def ball_mesh(rows=12, around=24, smooth=False):
+    """A sphere as triangles."""
+    lines = np.linspace(-math.pi / 2, math.pi / 2, rows + 1)
+    turns = 2.0 * math.pi * np.arange(around) / around
+    v = np.array([(math.cos(b) * math.cos(a), math.cos(b) * math.sin(a), math.sin(b)) for b in lines for a in turns])
+    triangles = []
+    for i in range(rows):
+        for j in range(around):
+            a, b = i * around + j, i * around + (j + 1) % around
+            triangles += [(a, b, b + around), (a, b + around, a + around)]
+    return Mesh(v * 0.7 + (0, 0, 0.7), triangles, corner_normals=v[np.array(triangles)] if smooth else None)
+
+
+def with_mesh():
+    """The ball as smooth triangles that mirror; an orthographic camera; the wall lets light through."""
+    scene = lit(wall=Material("wall", base=(0.9, 0.5, 0.3), alpha=0.5))
+    scene.objects[2] = Object("ball", ball_mesh(6, 10, smooth=True), materials=(Material("shiny", mirror=0.5),))
+    scene.camera = Camera(scene.camera.matrix, (-3, 3, -2.25, 2.25), "orthographic")
+    return scene
+
+
+def with_cylinder():
+    """The same with a cylinder, which no cone can be tested against, and a polygon that is not convex."""
+    corners = [(-1.4, -2, 0.1), (0.4, -2, 0.1), (0.4, -2, 0.9), (-0.5, -2, 0.3), (-1.4, -2, 0.9)]
+    return lit(solids.cylinder((1.4, 0, 0), (1.4, 0, 1.5), 0.4), solids.polygon(corners))
+
+
+def displayed(image):
+    """Displayed values of a picture."""
+    return np.sqrt(np.clip(np.asarray(image, float)[..., :3], 0.0, 1.0))
+
+
+def rmse(a, b):
+    """Root of the mean squared difference of displayed values."""
+    return float(np.sqrt(np.mean((displayed(a) - displayed(b)) ** 2)))
