@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from ..catalogue import build, techniques
+from ..catalogue import build
 from ..errors import Cancelled, MissingPackageError, SceneError
 from ..rendering import trace
 from . import report
@@ -48,6 +48,8 @@ class Setting:
         Keywords of :func:`~rayscope.core.trace`.
     scene : int
         0: as it is; n: its curved solids as meshes, n segments around.
+    technique : str
+        What traces it, where that is not the technique of the whole run.
     times : list of float
         Seconds of the timed runs, tracing alone.
     rays, tests : int
@@ -62,6 +64,7 @@ class Setting:
     knob: str
     options: dict
     scene: int = 0
+    technique: str = ""
     times: list = field(default_factory=list)
     rays: int = 0
     tests: int = 0
@@ -81,7 +84,7 @@ class Setting:
             "tests": self.tests,
             **self.error,
             "verdict": self.verdict,
-            "options": self.options,
+            "options": {**self.options, **({"technique": self.technique} if self.technique else {})},
         }
 
 
@@ -137,7 +140,7 @@ class _Sweep:
             progress,
             say,
         )
-        self.scenes, self.indices = {0: scene}, {0: build(scene, technique)}
+        self.scenes, self.indices = {0: scene}, {(0, ""): build(scene, technique)}
         self.began = time.perf_counter()
         self.done, self.total = 0.0, 1.0
         self.full = self._deep_enough()
@@ -204,7 +207,7 @@ class _Sweep:
         self._traced({**self.full, "samples": 1}, self.seed, work=0)  # what is imported or built at first use
         return max(self._traced({**self.full, "samples": 2}, self.seed, work=0).figures["T_R"] / 2.0, 1e-4)
 
-    def _traced(self, options, seed, scene=0, count=False, work=0.0):
+    def _traced(self, options, seed, scene=0, count=False, work=0.0, technique=""):
         """A picture; raises Cancelled when stopped."""
 
         def progress(fraction):
@@ -213,7 +216,7 @@ class _Sweep:
 
         result = trace(
             self.scenes[scene],
-            index=self.indices[scene],
+            index=self.indices[scene, technique],
             size=self.size,
             seed=seed,
             count=count,
@@ -279,11 +282,29 @@ class _Sweep:
             left_out.append("shadow rays to each light: no light of the scene has an extent.")
         self._tessellations(settings, left_out, finest)
         left_out.append("float32 against float64: the tracer computes in float64 alone.")
-        there = {row.name for row in techniques()}
-        for name in ("cones", "pyramids", "beams"):
-            if name not in there:
-                left_out.append(f"{name}: this version has no such technique.")
+        self._whole_pixels(settings, left_out)
         return settings, left_out
+
+    def _whole_pixels(self, settings, left_out):
+        """Settings of techniques that trace pixels as a whole, against the samples of all others."""
+        scene = self.scenes[0]
+        mirrors = any(m.reflects for m in scene.used_materials())
+        soft = any(light.has_extent and any(light.colour) for light in scene.lights)
+        least = [(f"threshold {t:g}", {"threshold": t}) for t in (0.1, 0.03, 0.01)] if mirrors else [("as it is", {})]
+        rays = [(f"{n} shadow rays", {"light_samples": n}) for n in (1, 4, 16)] if soft else [("as it is", {})]
+        # Rays do not scatter: neither shall cones.
+        for name, parameters, points in (("cones", {"gloss": False}, least), ("pyramids", {}, rays)):
+            index = build(scene, name, **parameters)
+            if not {kind.KIND for kind in index.primitives.kinds} & set(index.SUPPORTED):
+                left_out.append(f"{name}: the scene has none of the primitives they can be tested against ({', '.join(index.SUPPORTED)}).")
+                continue
+            self.indices[0, name] = index
+            left_out += [f"{name}: {notice}" for notice in index.notices]
+            base = {**self.full, "roulette": False, "samples": 1}
+            settings += [
+                Setting(f"{name} in place of samples", label, "antialiasing", {**base, **options}, technique=name)
+                for label, options in points
+            ]
 
     def _tessellations(self, settings, left_out, finest):
         """Settings with curved solids as meshes."""
@@ -294,7 +315,7 @@ class _Sweep:
             return
         for n in (8, 16, 32, 64):
             self.scenes[n] = tessellated(self.scenes[0], n)
-            self.indices[n] = build(self.scenes[n], self.technique)
+            self.indices[n, ""] = build(self.scenes[n], self.technique)
             settings.append(
                 Setting(
                     f"tessellation, {finest} samples",
@@ -331,7 +352,12 @@ class _Sweep:
                     continue
                 start = time.perf_counter()
                 result = self._traced(
-                    setting.options, self.seed, setting.scene, turn == 0, work[i] * (1.5 if turn == 0 else 1.0)
+                    setting.options,
+                    self.seed,
+                    setting.scene,
+                    turn == 0,
+                    work[i] * (1.5 if turn == 0 else 1.0),
+                    setting.technique,
                 )
                 spent[i] = time.perf_counter() - start
                 if turn == 0:

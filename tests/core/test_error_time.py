@@ -110,7 +110,10 @@ def test_every_knob_the_scene_has_something_for_is_swept(swept):
         "adaptive depth with roulette",
         "shadow rays to each light",
         "tessellation",
+        "cones in place of samples",
+        "pyramids in place of samples",
     }
+    assert {r["options"].get("technique") for r in swept["rows"]} == {None, "cones", "pyramids"}
     for row in swept["rows"]:
         assert set(lab.COLUMNS) <= set(row)
         assert 0 < row["T"] <= row["T_worst"] and len(row["times"]) == row["runs"] >= 1
@@ -142,10 +145,25 @@ def test_what_it_says_follows_from_its_rows(swept):
 
 def test_knobs_without_an_object_are_left_out_and_named():
     result = lab.error_time(room(mirror=False, soft=False, ball=False), (8, 6), seconds=3)
-    assert {r["curve"].split(",")[0] for r in result["rows"]} <= {"samples", "corners", "variance"}
+    assert {r["curve"].split(",")[0] for r in result["rows"]} <= {
+        "samples", "corners", "variance", "cones in place of samples", "pyramids in place of samples",
+    }
     left = " ".join(result["left_out"])
     for text in ("no mirrors and no glass", "no light of the scene has an extent", "no sphere, cylinder or cone"):
         assert text in left
+
+
+def test_cones_and_pyramids_where_nothing_fits_are_left_out():
+    """A scene of cylinders: neither; with a ball, cones alone."""
+    camera = Camera.look_at((0, -6, 2), (0, 0, 0), angle=math.radians(40))
+    lamp = Light("lamp", "point", (50, 50, 50), (3, -3, 4))
+    things = [solids.cylinder((0, 0, -1), (0, 0, 1), 0.5)]
+    for more, fitting in (([], set()), ([solids.sphere((1, 0, 0), 0.5)], {"cones"})):
+        result = lab.error_time(Scene(solids=things + more, lights=[lamp], camera=camera), (8, 6), seconds=1)
+        rows = {r["options"].get("technique") for r in result["rows"]} - {None}
+        left = {name for name in ("cones", "pyramids") if any(line.startswith(f"{name}: the scene has none") for line in result["left_out"])}
+        assert rows <= fitting and left == {"cones", "pyramids"} - fitting
+        assert not fitting or any(line.startswith("cones: cylinder") or line.startswith("cones in place") for line in result["left_out"])
 
 
 def test_dominated_settings():
