@@ -392,6 +392,8 @@ def bench_options(sub):
     sub.add_argument("--repeats", type=whole(1, 100), default=5)
     sub.add_argument("--seed", type=whole(0, 2**31 - 1), default=0)
     sub.add_argument("--growth", action="store_true", help="also how times grow from 1k to 1M triangles")
+    sub.add_argument("--division", action="store_true", help="instead: what divides space, against brute force, its walks, lists and regions; "
+                     "with --growth from 1k to 1M triangles only")
     sub.add_argument("--automatic", action="store_true", help="instead: the automatic choice of techniques against each fixed one, on the procedural databases")
 
 
@@ -401,6 +403,12 @@ def bench_verb(call):
         from .lab import needs
         rows = needs.benchmark(tuple(min(side, 256) for side in call.size), repeats=min(call.repeats, 3), say=say)
         return Outcome(report.table(rows, list(rows[0])), report.record("bench", None, None, {"automatic": True, "size": call.size}, rows=rows))
+    if call.division:
+        from .lab import division
+        size = tuple(min(side, 128) for side in call.size)
+        result = {"growth": division.growth(size=size, say=say)} if call.growth else division.division(call.subdivisions, size, say=say)
+        record = report.record("bench", None, None, {"division": True, "subdivisions": call.subdivisions, "size": size, "growth": call.growth}, **result)
+        return Outcome(division.text(result), record, DONE if result.get("met", True) else FAILED)
     from .lab import against_brute, bench
 
     result = bench.bench(call.subdivisions, call.size, call.repeats, call.seed, say=say)

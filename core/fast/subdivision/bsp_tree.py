@@ -36,6 +36,7 @@ class BspTree(CellTree):
     def build(self, progress, planes, directions, stop, max_depth, leaf_size, max_bytes, mailbox, lists):
         self.planes, self.directions = planes, np.array(DIRECTIONS[: directions if planes == "slabs" else 3])
         self.lay_out()
+        self._kept = None
         p, n = self.primitives, self.primitives.n
         corners, number = np.zeros((n, CORNERS, 3)), np.zeros(n, np.int64)
         outline = p.outlines()
@@ -43,6 +44,7 @@ class BspTree(CellTree):
         corners[polygon, :3], number[polygon] = outline[polygon], 3
         root = Cells(self.lo[None], self.hi[None], np.array([n]), np.arange(n), (corners, number))
         self.grow(root, progress, stop, max_depth or depth_for(n), leaf_size, max_bytes, "heap", lists)
+        self._kept = None
         if self.figures["N_ER"] > 8 * n:
             self.notices.append(bsp_notice(self.figures["N_ER"], n))
 
@@ -66,11 +68,12 @@ class BspTree(CellTree):
             low, high = self._extent(cells, normal.take(cell, axis=1))
             w = distance.take(cell)
             below, above = low < w - tolerance, high > w + tolerance
-            left, right = np.bincount(cell[below], minlength=m), np.bincount(cell[above], minlength=m)
+            left, right, inside = (np.bincount(cell[some], minlength=m) for some in (below, above, ~(below | above)))
             lo, hi = self._boxes(cells, np.concatenate([normal, distance[None]]))
             area = box_area(lo, hi)
-            score = area[0::3] * left + area[2::3] * right
-            better = (score < best) & (np.maximum(left, right) < n) & np.isfinite(distance)
+            score = area[0::3] * left + area[1::3] * inside + area[2::3] * right
+            # No part may have them all: the plane of polygons that lie in one plane divides nothing.
+            better = (score < best) & (np.maximum(np.maximum(left, right), inside) < n) & np.isfinite(distance)
             best = np.where(better, score, best)
             plane[:, better] = np.concatenate([normal, distance[None]])[:, better]
         normal, w = plane[:3].take(cell, axis=1), plane[3].take(cell)
@@ -125,21 +128,39 @@ class BspTree(CellTree):
 
     def _extent(self, cells, normal):
         """Extents of fragments, or of whole primitives, along directions, columns."""
-        corners, number = cells.more
-        low, high = np.full(len(number), np.inf), np.full(len(number), -np.inf)
-        for k in range(CORNERS):
-            some = np.flatnonzero(number > k) if k > 2 else np.flatnonzero(number > 0)
-            if not len(some):
-                break
-            p, n = corners[some, k].T, normal[:, some]
+        corners, having = self._columns(cells)
+        low = high = None
+        for k, some in enumerate(having):
+            p, n = corners[k], normal
+            if some is not None:
+                p, n = (column.take(some, axis=1) for column in (p, n))
             along = p[0] * n[0] + p[1] * n[1] + p[2] * n[2]
-            low[some], high[some] = np.minimum(low[some], along), np.maximum(high[some], along)
-        solid = np.flatnonzero(number == 0)
+            if k == 0:
+                low, high = along, along.copy()
+            elif some is None:
+                np.minimum(low, along, out=low)
+                np.maximum(high, along, out=high)
+            else:
+                low[some], high[some] = np.minimum(low.take(some), along), np.maximum(high.take(some), along)
+        solid = np.flatnonzero(cells.more[1] == 0)
         if len(solid):
             # A little more, for what square roots and sums may have lost.
             d, D = self.primitives.support(cells.item[solid], normal[:, solid].T)
             low[solid], high[solid] = d - 0.5 * TOLERANCE * self.margin, D + 0.5 * TOLERANCE * self.margin
         return low, high
+
+    def _columns(self, cells):
+        """Corners of fragments as columns, (corner, axis, fragment), and which fragments have each; None: all that have any."""
+        if self._kept is None or self._kept[0] is not cells:
+            corners, number = cells.more
+            having = [None] * 3
+            for k in range(3, CORNERS):
+                some = np.flatnonzero(number > k)
+                if not len(some):
+                    break
+                having.append(some)
+            self._kept = cells, np.ascontiguousarray(corners[:, : len(having)].transpose(1, 2, 0)), having
+        return self._kept[1:]
 
     @staticmethod
     def _boxes(cells, plane):

@@ -58,9 +58,11 @@ class BspTree(CellTree):
             extents = [self._extent(item, corners, normal) for item, corners in zip(node.items, node.boxes)]
             left = sum(low < distance - tolerance for low, _ in extents)
             right = sum(high > distance + tolerance for _, high in extents)
-            lower, _, upper = (_area(*box) for box in _boxes(node.lo, node.hi, normal, distance))
-            score = lower * left + upper * right
-            if score < best and max(left, right) < len(node.items):
+            inside = sum(low >= distance - tolerance and high <= distance + tolerance for low, high in extents)
+            lower, middle, upper = (_area(*box) for box in _boxes(node.lo, node.hi, normal, distance))
+            score = lower * left + middle * inside + upper * right
+            # No part may have them all: the plane of polygons that lie in one plane divides nothing.
+            if score < best and max(left, right, inside) < len(node.items):
                 best, plane = score, (*normal, distance)
         if plane is None:
             return None
