@@ -99,3 +99,29 @@ def test_grid_sequence_is_that_of_its_boxes():
         by_boxes = [(k - 1, a, b) for k, a, b in exact.tree_sequence(cells, o, d) if a < b]
         by_planes = [(index._number(k), a, b) for k, a, b in exact.grid_sequence(planes, o, d)]
         assert by_boxes == by_planes
+
+
+EDGE_SETS = ("almost edge-on", "whole numbers", "two corners alike", "ordinary", "wide")
+
+
+@pytest.mark.parametrize("kind", EDGE_SETS)
+def test_many_edge_functions_are_those_of_whole_numbers(kind):
+    from rayscope.core.fast.primitives import exact_edges
+    from rayscope.core.scene.exact import watertight
+    rng = np.random.default_rng(EDGE_SETS.index(kind))
+    p, q = rng.normal(size=(2, 3, 120))
+    if kind == "almost edge-on":
+        p[1:], q[1:] = p[0] * [rng.normal(size=120), rng.normal(size=120)], q[0] * 1.0
+        q[1:] *= p[1:] / p[0]
+    elif kind == "whole numbers":
+        p, q = np.round(4.0 * p), np.round(4.0 * q)
+    elif kind == "two corners alike":
+        p[1], q[1] = p[0], q[0]
+    elif kind == "wide":
+        p, q = (x * 2.0 ** rng.integers(-500, 500, x.shape) for x in (p, q))
+    area = [(0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0)]
+    right = np.transpose([watertight(*zip(p[:, i], q[:, i]), *area) or (0.0, 0.0, 0.0) for i in range(120)])
+    assert np.array_equal(exact_edges.edge_functions(p, q, lambda i: area), right)
+    _, open_ = exact_edges._distilled(p, q)
+    assert open_.mean() > 0.9 if kind == "wide" else not open_.any()     # what numpy decides, and what is left to whole numbers
+    assert right.any(axis=0).any() or kind == "two corners alike"

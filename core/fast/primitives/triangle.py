@@ -7,8 +7,9 @@ so a ray cannot slip between them.
 
 import numpy as np
 
-from ...scene.exact import DOUBTFUL, collinear, watertight
+from ...scene.exact import DOUBTFUL, collinear
 from ...scene.layout import mirrors, to_world
+from .exact_edges import edge_functions
 
 #: gamma(7): relative error of a point interpolated from three vertices (Pharr et al., PBR 4th ed., 6.8.5).
 GAMMA_7 = 7 * 2.0**-53 / (1 - 7 * 2.0**-53)
@@ -131,11 +132,11 @@ class Triangles:
             for column in (u, v, w, det):
                 column[doubtful[flat]] = 0.0
             doubtful = doubtful[~flat]
-        for i in doubtful:
-            corners = self.xyz[:, item[pair[i]]].reshape(3, 3).tolist()
-            exact = watertight(*((float(x[k][i]), float(y[k][i])) for k in range(3)), *corners)
-            u[i], v[i], w[i] = exact or (0.0, 0.0, 0.0)
-            det[i] = u[i] + v[i] + w[i]
+        if len(doubtful):
+            own, p, q = item.take(pair.take(doubtful)), *([column[~flat] for column in axis] for axis in (p, q))
+            exact = edge_functions(p, q, lambda i: self.xyz[:, own[i]].reshape(3, 3).tolist())
+            for column, value in zip((u, v, w, det), (*exact, exact[0] + exact[1] + exact[2])):
+                column[doubtful] = value
         sz = s[2].take(hit_ray)
         with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
             t = (u * (sz * z[0]) + v * (sz * z[1]) + w * (sz * z[2])) / det
