@@ -80,10 +80,11 @@ class Cells:
         Index of the cell above, -1 at the root.
     volume : str
         What the cells really are: "box", or "sphere", "obb", "kdop", "quad", "slab", "polygon", "beam"; lo and hi are then the boxes of what
-        they hold.
+        they hold. "sphere & box", "box | box": intersections and unions.
     shape : float64, shape (c, p), or None
         Of other volumes than boxes. sphere: centre, radius. obb: three unit axes, low ends along them, high ends. kdop: low
-        ends along the directions of :data:`KDOP_AXES`, then high ends. quad: the corners of a parallelogram, those that follow each
+        ends along the directions of :data:`KDOP_AXES`, then high ends. Intersections and unions: those of the parts, of boxes low
+        and high corners. quad: the corners of a parallelogram, those that follow each
         other share a side except the middle two. polygon: the corners of that part of a cell's plane that divides it, filled up with
         the last one; all the same where a cell is not divided. beam: as many corners where it starts as where it ends, filled up
         with the first one.

@@ -2,6 +2,8 @@
 
 import numpy as np
 
+from .volumes import chains
+
 #: Cells whose texels fill one row of the texture.
 CELLS_PER_ROW = 1024
 #: Flat cells and slabs are drawn so much smaller, so that neighbours can be told apart.
@@ -114,19 +116,22 @@ def boxes(cells, levels=None, leaves_only=False, empty=True, by="LEVEL", opacity
     texels : ndarray, shape (rows, k * CELLS_PER_ROW, 4), float32
         RGBA texels, k = 3 a box: lower corner, upper corner, linear colour with opacity; k = 5 a flat cell: its four corners, and
         the colour; k = 13 a piece of a plane: twelve corners, and the colour. Cells follow each other along a row, so that cell i starts at texel k i.
-        Of beams, all sides, each a flat cell.
+        Of beams, all sides, each a flat cell; of bounding volumes other than boxes, chains of lines, each like a piece of a plane.
     n : int
         Cells in it.
     """
     index = select(cells, levels, leaves_only, empty)
+    volumes = chains(cells, index)
     if cells.volume == "beam":
         index, corners = _sides(cells, index)
-    n, k = len(index), TEXELS.get(cells.volume, 3)
+    elif volumes is not None:
+        index, corners = volumes
+    n, k = len(index), TEXELS.get(cells.volume, 3) if volumes is None else TEXELS["polygon"]
     texels = np.empty((max(1, -(-n // CELLS_PER_ROW)) * CELLS_PER_ROW, k, 4), np.float32)
     texels[n:] = 0.0
     every = n == len(cells)
-    if cells.volume == "beam":
-        texels[:n, :4, :3] = corners
+    if cells.volume == "beam" or volumes is not None:
+        texels[:n, :k - 1, :3] = corners
     elif k > 3:
         corners = cells.shape.reshape(-1, k - 1, 3)[index]
         texels[:n, :k - 1, :3] = corners + (SMALLER if k == 5 else 0.0) * (corners.mean(axis=1, keepdims=True) - corners)

@@ -5,9 +5,9 @@ import bpy
 import gpu
 import numpy as np
 import pytest
-from bl_ext.user_default.rayscope.addon.show import overlay, overlay_data
+from bl_ext.user_default.rayscope.addon.show import overlay, overlay_data, volumes
 from bl_ext.user_default.rayscope.core import Camera, Material, Mesh, Object, Scene, build
-from bl_ext.user_default.rayscope.core.hits import Cells
+from bl_ext.user_default.rayscope.core.hits import KDOP_AXES, Cells
 from mathutils import Matrix
 
 
@@ -271,3 +271,65 @@ def test_sides_of_beams_as_flat_cells():
     # Each far edge ends where the next one begins: closed outlines.
     ends = {tuple(np.round(p, 5)) for p in sides[:, 2, :3]}
     assert ends == {tuple(np.round(p, 5)) for p in sides[:, 3, :3]}
+
+
+VOLUMES = [("sphere-tree", {}), ("obb-tree", {}), ("kdop-tree", {"k": "14"}), ("kdop-tree", {"k": "26"}), ("sorted-list", {"volume": "kdop-18"}),
+              ("sorted-list", {"volume": "sphere & aabb"}), ("sorted-list", {"volume": "aabb | aabb"})]
+
+
+@pytest.mark.parametrize("core", ("fast", "pure"))
+@pytest.mark.parametrize("name, parameters", VOLUMES)
+def test_bounding_volumes_are_drawn_as_what_they_are(name, parameters, core):
+    """Every chain lies on its volume's surface; its cells are those selected; and volumes reach as far as their chains."""
+    rng = np.random.default_rng(2)
+    corners = rng.random((20, 1, 3)) + 0.1 * rng.normal(size=(20, 3, 3))
+    cells = build(Scene.from_triangles(corners.reshape(-1, 3), np.arange(60).reshape(-1, 3)), name, core, **parameters).cells()
+    index = overlay_data.select(cells, leaves_only=True)
+    which, drawn = volumes.chains(cells, index)
+    assert set(which) == set(index) and drawn.shape == (len(which), 12, 3)
+    shape = cells.shape[which]
+    if cells.volume == "sphere":
+        np.testing.assert_allclose(np.linalg.norm(drawn - shape[:, None, :3], axis=2), np.broadcast_to(shape[:, 3:], (len(which), 12)), rtol=1e-9)
+    elif cells.volume == "obb":
+        along = np.einsum("ncx,nax->nca", drawn, shape[:, :9].reshape(-1, 3, 3))
+        ends = shape[:, 9:].reshape(-1, 1, 2, 3)
+        assert (np.abs(along[:, :, None] - ends).min(axis=2) < 1e-9).all() and len(which) == 4 * len(index)
+    elif cells.volume == "kdop":
+        axes = np.array(KDOP_AXES[shape.shape[1]], float)
+        along, half = drawn @ axes.T, len(axes)
+        assert (along > shape[:, None, :half] - 1e-9).all() and (along < shape[:, None, half:] + 1e-9).all()
+        on = (np.abs(along - shape[:, None, :half]) < 1e-9).sum(axis=2) + (np.abs(along - shape[:, None, half:]) < 1e-9).sum(axis=2)
+        assert (on >= 2).all()                          # along an edge two planes meet
+        # Euler: as many edges as corners and faces, less two; every corner has three edges or more.
+        for cell in index[:4]:
+            ends = np.unique(drawn[which == cell][:, (0, -1)].reshape(-1, 3).round(7), axis=0)
+            edges = (which == cell).sum()
+            assert edges >= 1.5 * len(ends) - 1e-9
+    elif cells.volume == "sphere & box":
+        own = shape[:, 4:]
+        inside = ((drawn >= own[:, None, :3] - 1e-9) & (drawn <= own[:, None, 3:] + 1e-9)).all(axis=(1, 2))
+        assert inside.sum() >= 4 * len(index)
+    else:
+        assert cells.volume == "box | box" and len(which) == 8 * len(index)
+    texels, n = overlay_data.boxes(cells, leaves_only=True)
+    assert n == len(which) and np.isfinite(texels).all()
+    np.testing.assert_allclose(texels.reshape(-1, 13, 4)[:n, :12, :3], drawn, rtol=1e-6, atol=1e-6)
+
+
+def test_very_many_volumes_are_drawn_as_boxes(monkeypatch):
+    cells = build(Scene.from_triangles(np.random.default_rng(1).random((300, 3)), np.arange(300).reshape(-1, 3)), "sphere-tree").cells()
+    monkeypatch.setattr(volumes, "CHAINS", 100)
+    texels, n = overlay_data.boxes(cells)
+    assert n == len(cells) and texels.shape[1] == 3 * overlay_data.CELLS_PER_ROW
+
+
+def test_a_sphere_is_drawn_round():
+    """Seen along z, one sphere: its outline at the radius, in all directions."""
+    cells = Cells.make([(-1.0, -1.0, -1.0)], [(1.0, 1.0, 1.0)], [0], [1], [True], [-1], "sphere", np.array([[0.0, 0.0, 0.0, 0.8]]), np.ones(1))
+    texels, n = overlay_data.boxes(cells)
+    drawn = with_gpu(lambda: overlay.picture(np.zeros((101, 101, 4), np.float32), texels, n, Matrix.Diagonal((1.0, 1.0, -1.0, 1.0))))
+    y, x = np.nonzero((drawn[..., :3] > 0).any(axis=-1))
+    radius = np.hypot(x - 50, y - 50) / 50.5
+    assert radius.max() < 0.84 and len(x) > 200
+    angle = np.arctan2(y - 50, x - 50)[radius > 0.75]
+    assert len(np.unique((angle / (2 * np.pi) * 48).round())) >= 46

@@ -31,6 +31,11 @@ class _Combined(Volumes):
     def concatenated(parts):
         return type(parts[0])([p[0].concatenated(p) for p in zip(*(part.parts for part in parts))], parts[0].kinds)
 
+    @property
+    def DRAWN(self):
+        """The parts' names, with what joins them between."""
+        return self.JOINED_BY.join(p.DRAWN for p in self.parts)
+
     def rows_of(self, rays):
         rows = [p.rows_of(rays) for p in self.parts]
         self.rows = [len(r) for r in rows]
@@ -46,6 +51,8 @@ class _Combined(Volumes):
 
 class Intersections(_Combined):
     """What all parts have in common."""
+
+    JOINED_BY = " & "
 
     @classmethod
     def fit(cls, primitives, item, offset, kinds):
@@ -72,6 +79,8 @@ class Intersections(_Combined):
 
 class Unions(_Combined):
     """Two axis-aligned boxes, around the parts of the primitives on either side of the middle of their common box."""
+
+    JOINED_BY = " | "
 
     @classmethod
     def fit(cls, primitives, item, offset, kinds):

@@ -17,11 +17,20 @@ class _Combined(Volume):
     def __init__(self, parts):
         self.parts, self.margin = parts, Margin.joined(parts)
 
+    @property
+    def DRAWN(self):
+        """The parts' names, with what joins them between."""
+        return self.JOINED_BY.join(p.DRAWN for p in self.parts)
+
+    def shape(self):
+        return sum((p.shape() or (*p.lo, *p.hi) for p in self.parts), ())
+
 
 class Intersection(_Combined):
     """What all parts have in common."""
 
     __slots__ = ()
+    JOINED_BY = " & "
 
     @classmethod
     def around(cls, primitives, kinds):
@@ -54,6 +63,7 @@ class Union(_Combined):
     """Two axis-aligned boxes, around the parts of the primitives on either side of the middle of their common box."""
 
     __slots__ = ()
+    JOINED_BY = " | "
 
     @classmethod
     def around(cls, primitives, kinds):
