@@ -18,13 +18,19 @@ def open_in_blender(path, size):
     return open_file(path, size)
 
 
+def read_frames(*arguments):
+    """Read the frames of the file that is open in the bpy module."""
+    from .addon.frames import read_frames
+    return read_frames(*arguments)
+
+
 def main():
     """The command; its exit code."""
     # stdout belongs to the results: what Blender itself prints there, from C, goes to stderr.
     sys.stdout.flush()
     sys.stdout = os.fdopen(os.dup(1), "w", encoding="utf-8", closefd=False)
     os.dup2(2, 1)
-    return command(sys.argv[1:], open_in_blender=open_in_blender)
+    return command(sys.argv[1:], open_in_blender=open_in_blender, read_frames=read_frames)
 
 
 if __name__ == "__main__":

@@ -5,9 +5,10 @@ import bpy
 
 def run(argv):
     """Run the command on the scene that is open; its exit code."""
+    from .frames import read_frames
     from .open_file import open_scene
     from ..core.command import main
-    return main(argv, read_scene=open_scene)
+    return main(argv, read_scene=open_scene, read_frames=read_frames)
 
 
 _handle = None

@@ -42,7 +42,7 @@ class Beam:
     EDGES = ((0, 1), (1, 3), (3, 2), (2, 0), (4, 5), (5, 7), (7, 6), (6, 4), (0, 4), (1, 5), (2, 6), (3, 7))
 
     def corners(self):
-        """The corners of the frustum that the beam fills together with the box of its origins, as far as the scene's box reaches.
+        """The corners of the frustum that holds the beam, from where its origins begin to as far as the scene's box reaches.
 
         Returns
         -------
@@ -50,17 +50,15 @@ class Beam:
             Four of the near end, four of the far end.
         """
         a, b, c = self.axis, (self.axis + 1) % 3, (self.axis + 2) % 3
-        near = self.lo[a] if self.sign > 0 else self.hi[a]
-        far = max(self.sign * self.box[self.sign > 0][a], self.sign * near) * self.sign
-        # Rays that spread begin at the near end of the box, and so does the widest part of those that turn inwards.
-        away = [abs(far - m) for m in (self.lo[a], self.hi[a])]
+        first, last = (self.lo[a], self.hi[a])[:: self.sign]
+        end = self.sign * max(self.sign * self.box[self.sign > 0][a], self.sign * last)
         out = np.empty((8, 3))
         for k in range(8):
-            out[k, a] = far if k & 4 else near
-            for axis, side, (low, high) in ((b, k & 1, self.u), (c, k >> 1 & 1, self.v)):
-                edge, slope = (self.hi, high) if side else (self.lo, low)
-                reach = [slope * w for w in away]
-                out[k, axis] = edge[axis] + (0.0 if not k & 4 else max(reach) if side else min(reach))
+            out[k, a] = end if k & 4 else first
+            for axis, side, slopes in ((b, k & 1, self.u), (c, k >> 1 & 1, self.v)):
+                # A side that spreads goes through the first origins, one that turns inwards through the last.
+                reach = [slopes[side] * self.sign * (out[k, a] - m) for m in (first, last)]
+                out[k, axis] = (self.hi[axis] + max(reach)) if side else (self.lo[axis] + min(reach))
         return out
 
 

@@ -236,7 +236,7 @@ TECHNIQUES = (
               "Cells of origins and directions, made as rays come, list what their beams may meet; with time for a list of scenes, frames of an animation",
               parameters=(
                   Parameter("leaf_size", {"pure": 8, "fast": 16}, "A cell with a longer list is divided", low=1, high=1024),
-                  Parameter("max_depth", 12, "Levels below the root, at most", low=0, high=20),
+                  Parameter("max_depth", 16, "Levels below the root, at most", low=0, high=24),
                   Parameter("similarity", 0.9, "Neighbours that have this part of their primitives in common share one list", low=0.0, high=1.0),
                   Parameter("max_bytes", 256e6, "Above it the cells not used for longest are given up", low=1e3, high=1e12, unit="bytes"),
               )),

@@ -86,6 +86,7 @@ def main(argv=None, read_scene=None, open_in_blender=None, read_frames=None):
         return _fail(f"rayscope: {error}", WRONG_CALL)
     call.scene = lambda size=None: _scene(call, read_scene, open_in_blender, size)
     call.read_frames = read_frames
+    call.read_frames = read_frames
     try:
         outcome = VERBS[call.verb].run(call)
         print(report.to_json(outcome.json) if call.json else outcome.text, flush=True)

@@ -18,9 +18,11 @@ DEMAND = 8
 #: A division that leaves more than this part of a list has not helped; ...
 HELPS = 0.9
 #: ... after so many in a row there is no other.
-TRIES = 6
+TRIES = 8
 #: A cell is divided along an axis whose extent is at least this part of the largest one.
 WIDE = 0.5
+#: How much more extents of origins count than those of directions: rays from one point are told apart by directions alone.
+ORIGINS = 2.0
 #: Coordinates that each further set of cells, for rays from farther away, allows for: so many times as large ...
 STEP = 2.0**8
 #: ... from this many times the scene's on; and how many sets there are.
@@ -161,20 +163,24 @@ class Hypercubes:
             self.n_entries += self.bounds.n
         else:
             start, owner = self.start[self.roots[face]], self.roots[face]
-        mask = self._wide(lo, hi, np.array([number]))
+        mask = self._wide(lo, hi, np.array([number]), np.array([start]), np.array([self.bounds.n]))
         self.roots[number] = self._add(lo, hi, root=number, parent=-1, level=0, start=start, count=self.bounds.n, owner=owner, twin=self.n, mask=mask,
                                        first=-1, useless=0, stamp=self.now)[0]
 
-    def _wide(self, lo, hi, root):
+    def _wide(self, lo, hi, root, start, count):
         """Along which axes cells are divided: masks."""
         size = hi - lo
         slack = self.slack.take(root // 6)
         face = root % 6
         end = np.where(face & 1, -self.scene_lo.take(face >> 1), self.scene_hi.take(face >> 1))
-        # How much a beam is the wider for its directions, half-way to the scene's end.
-        half_way = 0.5 * np.maximum(end - lo[M], 0.0)
+        # How much the beam is the wider for its directions where the middle one of its primitives is.
+        begin = self.bounds.over(0, len(self.bounds.frames)).ravel()
+        middle = self.entries.take(np.where(count > 0, start + count // 2, 0))
+        place = 0.5 * (begin.take(face * self.bounds.n + middle) - begin.take((face ^ 1) * self.bounds.n + middle))
+        reach = np.maximum(np.minimum(place, end) - lo[M], size[M])
+        size[:3] *= ORIGINS
         size[M] *= 0.5
-        size[[U, V]] *= half_way
+        size[[U, V]] *= reach
         frames = size[FRAME] > 1.0
         size[FRAME] *= self.bounds.speed
         use = (size >= WIDE * size.max(axis=0)) & (size > 16.0 * slack)
@@ -331,9 +337,11 @@ class Hypercubes:
         useless = np.where(n > HELPS * count, self.useless[parent] + 1, 0)
         lo, hi = (np.concatenate([end[k] for end in ends], axis=1) for k in (0, 1))
         twice = np.tile(parent, 2)
-        added = self._add(lo, hi, root=self.root[twice], parent=twice, level=self.level[twice] + 1, start=start.ravel(), count=n.ravel(),
-                          owner=owner.ravel(), twin=number[::-1].ravel(), mask=self._wide(lo, hi, self.root[twice]), first=-1, useless=useless.ravel(), stamp=self.now)
-        self.shared += int(((owner != number) & (n > 0)).sum())
+        start, n = start.ravel(), n.ravel()
+        added = self._add(lo, hi, root=self.root[twice], parent=twice, level=self.level[twice] + 1, start=start, count=n, owner=owner.ravel(),
+                          twin=number[::-1].ravel(), mask=self._wide(lo, hi, self.root[twice], start, n), first=-1, useless=useless.ravel(),
+                          stamp=self.now)
+        self.shared += int(((owner != number).ravel() & (n > 0)).sum())
         self.parts[self.first[twice] + np.concatenate([2 * pair, 2 * pair + 1])] = added
         return True
 

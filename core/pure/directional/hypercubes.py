@@ -16,9 +16,11 @@ from .beam import B, C, FRAME, M, ROUNDING, U, V, Beam
 #: A division that leaves more than this part of a list has not helped; ...
 HELPS = 0.9
 #: ... after so many in a row there is no other.
-TRIES = 6
+TRIES = 8
 #: A cell is divided along an axis whose extent is at least this part of the largest one.
 WIDE = 0.5
+#: How much more extents of origins count than those of directions: rays from one point are told apart by directions alone.
+ORIGINS = 2.0
 #: Coordinates that each further set of cells, for rays from farther away, allows for: so many times as large ...
 STEP = 2.0**8
 #: ... from this many times the scene's on; and how many sets there are.
@@ -147,10 +149,13 @@ class Hypercubes:
         size = [high - low for low, high in zip(cell.lo, cell.hi)]
         scene_lo, scene_hi = self.bounds.box
         end = -scene_lo[cell.face >> 1] if cell.face & 1 else scene_hi[cell.face >> 1]
-        # How much a beam is the wider for its directions, half-way to the scene's end.
-        half_way = 0.5 * max(end - cell.lo[M], 0.0)
+        # How much the beam is the wider for its directions where the middle one of its primitives is.
+        reach = size[M]
+        if cell.items:
+            begin = self.bounds.over(0, len(self.bounds.frames))[cell.items[len(cell.items) // 2]]
+            reach = max(min(0.5 * (begin[cell.face] - begin[cell.face ^ 1]), end) - cell.lo[M], reach)
         frames = size[FRAME] > 1.0
-        for axis, weight in ((M, 0.5), (U, half_way), (V, half_way), (FRAME, self.bounds.speed)):
+        for axis, weight in ((M, 0.5 * ORIGINS), (B, ORIGINS), (C, ORIGINS), (U, reach), (V, reach), (FRAME, self.bounds.speed)):
             size[axis] *= weight
         least = WIDE * max(size)
         return [k for k in range(6) if size[k] >= least and size[k] > 16.0 * self.slack[cell.which_set] and (k != FRAME or frames)]
