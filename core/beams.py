@@ -6,6 +6,8 @@ from .errors import MemoryEstimateError, Notice
 from .hits import Cells
 from .memory import free_memory
 
+#: Kinds of primitive that are made of flat faces; instances are those of meshes.
+SUPPORTED = ("triangle", "polygon", "instance")
 #: Bytes that a fragment takes, about, with all that is made of it on the way.
 BYTES = 2_000
 #: Width in pixels of the picture that the overlay's tree is made for.
@@ -22,13 +24,17 @@ def check_memory(most):
         )
 
 
-def hidden_notice(kinds):
-    """What is said of primitives that beams do not know."""
-    return Notice(
-        "beams",
-        f"{', '.join(kinds)}: beams know triangles and polygons only; the pixels where these are seen, and what they may "
-        "shade, are traced by sampled rays.",
+def hidden_notices(kinds):
+    """What is said of primitives that beams do not know; `kinds` says how many there are of each kind."""
+    others = {kind: n for kind, n in kinds.items() if kind not in SUPPORTED}
+    if not others:
+        return []
+    names = [f"{n} of the kind {'combination (CSG)' if kind == 'csg' else kind}" for kind, n in others.items()]
+    text = (
+        "beams know triangles and polygons only; the pixels where these are seen, and what they may shade, are traced by "
+        "sampled rays."
     )
+    return [Notice(", ".join(names), text)]
 
 
 def faces_notice(n, most):

@@ -293,7 +293,7 @@ class _Sweep:
         least = [(f"threshold {t:g}", {"threshold": t}) for t in (0.1, 0.03, 0.01)] if mirrors else [("as it is", {})]
         rays = [(f"{n} shadow rays", {"light_samples": n}) for n in (1, 4, 16)] if soft else [("as it is", {})]
         # Rays do not scatter: neither shall cones.
-        for name, parameters, points in (("cones", {"gloss": False}, least), ("pyramids", {}, rays)):
+        for name, parameters, points in (("cones", {"gloss": False}, least), ("pyramids", {}, rays), ("beams", {}, rays)):
             index = build(scene, name, **parameters)
             if not {kind.KIND for kind in index.primitives.kinds} & set(index.SUPPORTED):
                 left_out.append(f"{name}: the scene has none of the primitives they can be tested against ({', '.join(index.SUPPORTED)}).")

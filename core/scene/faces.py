@@ -45,9 +45,7 @@ class Faces:
     bent : ndarray, shape (m,), bool
         Whether smooth normals make it a curved mirror.
     box_lo, box_hi : ndarray, shape (b, 3)
-        The boxes that hide other primitives, ...
-    hidden : list of str
-        ... and what kinds these are, in words.
+        The boxes that hide other primitives.
     """
 
     corners: np.ndarray
@@ -62,7 +60,6 @@ class Faces:
     bent: np.ndarray
     box_lo: np.ndarray
     box_hi: np.ndarray
-    hidden: list
     origin: np.ndarray
 
     def __len__(self):
@@ -73,7 +70,7 @@ class Faces:
         """The faces of all objects; instances are copied into world space."""
         everything = Layout.of(objects, copies_at_most=np.inf)
         parts = [_of_meshes(objects, everything.meshes)]
-        boxes, hidden = [], {}
+        boxes = []
         for kind, placed in place(objects, everything.shapes).items() if everything.shapes else ():
             if kind == "triangle":
                 corners = Corners.of(placed).xyz
@@ -83,16 +80,13 @@ class Faces:
                 parts.append(_of_polygons(placed))
             else:
                 rows = [(t.object, t.primitive) for t in placed] if kind == "csg" else zip(placed.object_of, placed.primitive_of)
-                rows = [(int(i), int(k)) for i, k in rows]
-                hidden[kind] = len(rows)
                 boxes += [_box(objects[i], objects[i].geometry.solids[k]) for i, k in rows]
         ends = np.cumsum([0] + [len(p[3]) for p in parts])
         corners = [(c, n, s + first) for (c, n, s, *_), first in zip(parts, ends)]
         surfaces = [np.concatenate(column) for column in zip(*(p[3:] for p in parts))]
         lo, hi = (np.array([b[k] for b in boxes]).reshape(-1, 3) for k in (0, 1))
         corners.append(_of_boxes(lo, hi, int(ends[-1])))
-        names = [f"{n} of the kind {'combination (CSG)' if kind == 'csg' else kind}" for kind, n in hidden.items()]
-        faces = cls(*(np.concatenate(column) for column in zip(*corners)), *surfaces, None, lo, hi, names, np.asarray(origin, float))
+        faces = cls(*(np.concatenate(column) for column in zip(*corners)), *surfaces, None, lo, hi, np.asarray(origin, float))
         for name in ("corners", "anchor", "box_lo", "box_hi"):
             setattr(faces, name, getattr(faces, name) - faces.origin)
         faces.bent = _bent(objects, faces)

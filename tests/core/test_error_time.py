@@ -112,8 +112,10 @@ def test_every_knob_the_scene_has_something_for_is_swept(swept):
         "tessellation",
         "cones in place of samples",
         "pyramids in place of samples",
+        "beams in place of samples",
     }
-    assert {r["options"].get("technique") for r in swept["rows"]} == {None, "cones", "pyramids"}
+    assert {r["options"].get("technique") for r in swept["rows"]} == {None, "cones", "pyramids", "beams"}
+    assert any(line.startswith("beams: ") and "sphere" in line and "sampled" in line for line in swept["left_out"])
     for row in swept["rows"]:
         assert set(lab.COLUMNS) <= set(row)
         assert 0 < row["T"] <= row["T_worst"] and len(row["times"]) == row["runs"] >= 1
@@ -146,7 +148,12 @@ def test_what_it_says_follows_from_its_rows(swept):
 def test_knobs_without_an_object_are_left_out_and_named():
     result = lab.error_time(room(mirror=False, soft=False, ball=False), (8, 6), seconds=3)
     assert {r["curve"].split(",")[0] for r in result["rows"]} <= {
-        "samples", "corners", "variance", "cones in place of samples", "pyramids in place of samples",
+        "samples",
+        "corners",
+        "variance",
+        "cones in place of samples",
+        "pyramids in place of samples",
+        "beams in place of samples",
     }
     left = " ".join(result["left_out"])
     for text in ("no mirrors and no glass", "no light of the scene has an extent", "no sphere, cylinder or cone"):

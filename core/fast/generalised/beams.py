@@ -7,7 +7,7 @@ approximation; lights cast beams for their shadows. Rays by themselves are hande
 
 import numpy as np
 
-from ...beams import cells_of, check_memory, faces_notice, hidden_notice, picture_size
+from ...beams import SUPPORTED, cells_of, check_memory, faces_notice, hidden_notices, picture_size
 from ...scene.faces import Faces
 from ..directional.second import Handing
 from ..tracing.surface import Surfaces
@@ -19,11 +19,13 @@ from .beam_tree import BeamTree
 class Beams(Handing):
     """The polygons of a scene, from which trees of beams are cast."""
 
+    SUPPORTED = SUPPORTED
     _faces = _bsp = None
 
     def build(self, progress, max_fragments, levels):
         if getattr(self.scene, "camera", None) is None:
             self.notices.append(self.needs("a camera", "Add one to see beams."))
+        self.notices += hidden_notices({k.KIND: k.n for k in self.primitives.kinds})
 
     def traverse(self, rays, query):
         self.hand_over(rays, query)
@@ -41,8 +43,6 @@ class Beams(Handing):
                 self.figures["memory"] += self._bsp.nbytes
             except TooMany:
                 self.notices.append(faces_notice(len(faces), most))
-            if faces.hidden:
-                self.notices.append(hidden_notice(faces.hidden))
             self._faces = faces
         return self._faces, self._bsp
 

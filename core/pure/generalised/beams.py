@@ -5,7 +5,9 @@ cuts out of it is visible, exactly. Mirrors reflect the beam that meets them, gl
 approximation; lights cast beams for their shadows. Rays by themselves are handed to a bvh.
 """
 
-from ...beams import cells_of, check_memory, faces_notice, hidden_notice, picture_size
+from collections import Counter
+
+from ...beams import SUPPORTED, cells_of, check_memory, faces_notice, hidden_notices, picture_size
 from ...scene.faces import Faces
 from ..directional.second import Handing
 from ..structure import memory_of
@@ -19,11 +21,13 @@ from .beam_tree import BeamTree
 class Beams(Handing):
     """The polygons of a scene, from which trees of beams are cast."""
 
+    SUPPORTED = SUPPORTED
     _faces = _bsp = None
 
     def build(self, progress, max_fragments, levels):
         if getattr(self.scene, "camera", None) is None:
             self.notices.append(self.needs("a camera", "Add one to see beams."))
+        self.notices += hidden_notices(Counter(p.KIND for p in self.primitives))
 
     def walk(self, query):
         self.hand_over(query)
@@ -41,8 +45,6 @@ class Beams(Handing):
                 self.figures["memory"] += memory_of(self._bsp.root)
             except TooMany:
                 self.notices.append(faces_notice(len(faces), most))
-            if faces.hidden:
-                self.notices.append(hidden_notice(faces.hidden))
             self._faces = faces
         return self._faces, self._bsp
 
