@@ -2,6 +2,17 @@
 import bpy
 
 
+def check_lists():
+    """The graphics hardware of the window proposes full occluders, and sees nothing that lists lack."""
+    from bl_ext.user_default.rayscope.addon.read import read_scene
+    from bl_ext.user_default.rayscope.addon.show import id_pass
+    from bl_ext.user_default.rayscope.core import build
+
+    index = build(read_scene(bpy.context.evaluated_depsgraph_get(), for_render=False), "light-buffer", z_buffer=True, resolution=256)
+    index.z_buffer = id_pass.z_buffer
+    assert len(index.cells()) > 1000 and id_pass.unlisted(index) == []
+
+
 def steps():
     scene = bpy.context.scene
     bpy.data.objects.remove(bpy.data.objects["Cube"])
@@ -28,6 +39,13 @@ def steps():
     bpy.ops.rayscope.build()
     overlay.in_front, overlay.colour_by = True, "COUNT"
     yield "grid"
+    overlay.last_level = 64
+    for technique, name in (("light-buffer", "lights"), ("image-directory", "directory")):
+        scene.rayscope.technique = technique
+        assert bpy.ops.rayscope.build() == {"FINISHED"}
+        yield name
+    scene.rayscope.technique = "grid"
+    check_lists()
     bpy.ops.rayscope.clear()
     yield "cleared"
     bpy.ops.rayscope.build()

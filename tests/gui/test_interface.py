@@ -27,6 +27,8 @@ def test_overlay_is_drawn_filtered_hidden_and_gone(tmp_path):
     assert nothing + 300 < n["root"] < nothing + 3000, "the root's twelve edges"
     assert nothing + 1000 < n["behind"] < n["shown"], "what the surface hides is not drawn"
     assert n["grid"] > nothing + 1000
+    assert n["lights"] > nothing + 100, "a cube around the lamp"
+    assert n["directory"] > nothing + 300, "the picture plane's cells before the camera"
     assert abs(n["cleared"] - nothing) < 30 and abs(n["disabled"] - nothing) < 30
     assert n["enabled"] > nothing + 3000, "enabled again, it still works"
 

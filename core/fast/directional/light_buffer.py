@@ -17,8 +17,8 @@ from .view import View
 
 #: How far beside a light a ray may pass, or beyond it end, relative to the largest coordinate; well within the footprints' own rounding.
 BESIDE = 2.0**-46
-#: Half the edge of the cubes that are drawn, relative to the scene.
-SHOWN = 0.02
+#: Half the edge of the cubes that are drawn: relative to the scene, or to its distance if that is more.
+SHOWN, SHOWN_AWAY = 0.02, 0.25
 #: A batch of rays whose light is not told is compared with so many lights.
 LIGHTS_TRIED = 16
 
@@ -95,9 +95,15 @@ class LightBuffer(Handing):
             return super().cells()
         parts = []
         for number in range(min(len(self.lights), LIGHTS_TRIED)):
-            parts += [window.quads(SHOWN * self.extra) for window in self.buffer(number).windows()]
+            parts += [window.quads(self._shown(number)) for window in self.buffer(number).windows()]
             self._make_room(number)
         return joined(parts)
+
+    def _shown(self, number):
+        """Half the edge of the cube that is drawn around a light."""
+        lo, hi, place = self.primitives.lo.min(axis=0), self.primitives.hi.max(axis=0), np.asarray(self.lights[number].position)
+        away = float(np.linalg.norm(np.maximum(np.maximum(lo - place, place - hi), 0.0)))
+        return max(SHOWN * self.extra, SHOWN_AWAY * away)
 
     def _make_room(self, number):
         """Give up the buffers not used for longest when all take too much memory."""

@@ -40,7 +40,7 @@ class ImageDirectory(Handing):
 
     def cells(self):
         """The cells on the camera's frame, at distance 1 of a perspective camera."""
-        return quads([(self.view, self.root)], float(self.view.perspective)) if self.root else super().cells()
+        return quads([(self.view, self.root, float(self.view.perspective))]) if self.root else super().cells()
 
     def _occludes(self, footprint, low, high):
         """A primitive that covers a cell ends its rays where it lies between the near plane and infinity."""

@@ -17,8 +17,8 @@ from .view import LOSS, View, cross
 
 #: How far beside a light a ray may pass, or beyond it end, relative to the largest coordinate; well within the footprints' own rounding.
 BESIDE = 2.0**-46
-#: Half the edge of the cubes that are drawn, relative to the scene.
-SHOWN = 0.02
+#: Half the edge of the cubes that are drawn: relative to the scene, or to its distance if that is more.
+SHOWN, SHOWN_AWAY = 0.02, 0.25
 #: Levels of an adaptive face, where no resolution is asked for.
 LEVELS = 8
 #: A ray whose light is not told is compared with so many lights.
@@ -90,9 +90,15 @@ class LightBuffer(Handing):
         windows = []
         for number in range(min(len(self.lights), LIGHTS_TRIED)):
             self.buffers[number] = self.buffers.pop(number, None) or self._new(number)
-            windows += self.buffers[number].windows()
+            windows += [(*window, self._shown(number)) for window in self.buffers[number].windows()]
             self._make_room(number)
-        return quads(windows, SHOWN * self.extra)
+        return quads(windows)
+
+    def _shown(self, number):
+        """Half the edge of the cube that is drawn around a light."""
+        lo, hi = (tuple(map(f, zip(*(getattr(p, end) for p in self.primitives)))) for f, end in ((min, "lo"), (max, "hi")))
+        away = math.hypot(*(max(l - x, x - h, 0.0) for l, h, x in zip(lo, hi, self.lights[number].position)))
+        return max(SHOWN * self.extra, SHOWN_AWAY * away)
 
     def _new(self, number):
         """A buffer for a light."""

@@ -102,10 +102,10 @@ def divide_evenly(footprints, resolution, z_buffer, occludes=lambda footprint, l
     return _numbered(root)
 
 
-def quads(windows, z):
-    """Cells to draw: those of some windows, pairs of a view and a root, at a distance `z`."""
+def quads(windows):
+    """Cells to draw: those of some windows, each a view, a root, and the distance at which it is drawn."""
     corners, level, count, leaf, parent, covered = ([] for _ in range(6))
-    for view, root in windows:
+    for view, root, z in windows:
         first, above = len(corners), {}
         for cell in root.walk():
             corners.append(view.corners(cell.area, z))
