@@ -85,8 +85,7 @@ def main(argv=None, read_scene=None, open_in_blender=None, read_frames=None):
     except ParameterError as error:
         return _fail(f"rayscope: {error}", WRONG_CALL)
     call.scene = lambda size=None: _scene(call, read_scene, open_in_blender, size)
-    call.read_frames = read_frames
-    call.read_frames = read_frames
+    call.read_frames, call.in_blender = read_frames, read_scene is not None
     try:
         outcome = VERBS[call.verb].run(call)
         print(report.to_json(outcome.json) if call.json else outcome.text, flush=True)
@@ -467,6 +466,28 @@ def stability_verb(call):
     return Outcome("\n".join(text), record, FAILED if result["failed"] else DONE)
 
 
+# --- check ------------------------------------------------------------------------------------------------------------
+
+def check_options(sub):
+    sub.add_argument("structure", metavar="FILE.py", help="a Python file with a structure in it; the README has an example")
+    sub.add_argument("--scene", dest="scene_file", metavar="FILE", help=f"also on this scene ({', '.join(ENDINGS)}); in Blender, the one that is open")
+    sub.add_argument("--seconds", metavar="S", type=whole(1, 3600), default=20, help="a case that takes longer is stopped")
+    sub.add_argument("--seed", type=whole(0, 2**31 - 1), default=0)
+
+
+def check_verb(call):
+    """A structure that was handed in, against brute force."""
+    from .lab import check
+
+    found = check.load(call.structure)
+    call.file = call.scene_file
+    scene = call.scene() if call.scene_file or call.in_blender else None
+    results = [check.check(structure, core, call.structure, scene, call.seed, call.seconds, say=say) for structure, core in found]
+    failed = any(r["failed"] for r in results)
+    record = report.record("check", scene, call.seed, {"file": str(call.structure), "seconds": call.seconds}, results=results, failed=failed)
+    return Outcome(check.text(results), record, FAILED if failed else DONE)
+
+
 # --- bounds, motion ---------------------------------------------------------------------------------------------------
 
 def bounds_options(sub):
@@ -705,6 +726,7 @@ VERBS = {
                     scene=False),
     "stability": Verb("run techniques on stiff and extreme cases against exact arithmetic", stability_verb, stability_options, scene=False),
     "frames": Verb("build one ray classification for all frames of an animation, and hold it against a build for each", frames_verb, frames_options),
+    "check": Verb("hold a structure of your own against brute force", check_verb, check_options, scene=False),
     "needs": Verb("say what the scene needs, what is left out and why", needs_verb, needs_options),
     "inspect": Verb("say what each object costs, and what could be done", inspect_verb, inspect_options),
 }
