@@ -76,6 +76,10 @@ def draw_overlay(layout, scene):
         row = layout.row()
         row.alignment = "RIGHT"
         row.label(text=f"{high} lists or axes" if overlay.colour_by == "GROUP" else f"Purple {low}, yellow {high}")
+        if built.cells.covered is not None:
+            row = layout.row()
+            row.alignment = "RIGHT"
+            row.label(text="Red: one primitive covers the cell")
     layout.prop(overlay, "opacity", slider=True)
     layout.prop(overlay, "in_front")
     layout.operator("rayscope.point", icon="EYEDROPPER")

@@ -34,6 +34,8 @@ LARGE = 1.0 / 16.0
 MADE, GROUP = 512, 4096
 #: Bytes of an entry.
 ENTRY = 8
+#: Cubes that are drawn as long as no ray has come.
+SHOWN = 16
 
 
 class RayCoherence(Handing):
@@ -208,14 +210,21 @@ class RayCoherence(Handing):
             self.figures["loose"] = float(self.measured[1] / self.measured[0])
 
     def cells(self):
-        """The cells that have a list, in place: each on its cube, whose corners lie on the primitive's sphere."""
+        """The cells that have a list, in place: each on its cube, whose corners lie on the primitive's sphere.
+
+        As long as no ray has come, the cubes of some primitives, to see what there would be.
+        """
         if not self.primitives.n:
             return super().cells()
-        made = np.flatnonzero(self.lists.count >= 0)
-        item, cell = np.divmod(self.lists.keys[made], len(self.cone[1]))
+        per, finite = len(self.cone[1]), np.flatnonzero(np.isfinite(self.radius[:self.primitives.n]))
+        keys, count = self.lists.keys, self.lists.count
+        if not len(keys):
+            keys = (finite[::-(-len(finite) // SHOWN) or 1, None] * per + np.arange(per)).ravel()
+            count = self._made(keys, self.loose)[0]
+        item, cell = np.divmod(keys[count >= 0], per)
         half, none = self.radius[item] / np.sqrt(3.0), np.full(len(item), -1)
         corners = np.stack([self.centre[:, item] + half * corner(self.resolution, cell, di, dj) for di in (0, 1) for dj in (0, 1)], axis=-1)
-        return Cells.quads(corners.transpose(1, 2, 0), none + 1, self.lists.count[made], none < 0, none, none >= 0)
+        return Cells.quads(corners.transpose(1, 2, 0), none + 1, count[count >= 0], none < 0, none, none >= 0)
 
 
 class Store:

@@ -25,6 +25,8 @@ ROUNDING = 2.0**-40
 OFF = 2.0**-15
 #: Bytes of an entry, about.
 ENTRY = 112
+#: Cubes that are drawn as long as no ray has come.
+SHOWN = 16
 
 
 class RayCoherence(Handing):
@@ -151,12 +153,20 @@ class RayCoherence(Handing):
             self.figures["loose"] = self.measured[1] / self.measured[0]
 
     def cells(self):
-        """The cells that have a list, in place: each on its cube, whose corners lie on the primitive's sphere."""
+        """The cells that have a list, in place: each on its cube, whose corners lie on the primitive's sphere.
+
+        As long as no ray has come, the cubes of some primitives, to see what there would be.
+        """
         if not self.primitives:
             return super().cells()
         quads, count = [], []
-        for (item, cell), entries in sorted(self.lists.items(), key=lambda pair: pair[0]):
-            if entries is None:
+        lists = self.lists
+        if not lists:
+            finite = [item for item, _ in enumerate(self.primitives) if math.isfinite(self.spheres[item][1])]
+            some = finite[::-(-len(finite) // SHOWN) or 1]
+            lists = {(item, cell): self._made(item, cell, self.reach) for item in some for cell in range(len(self.cones))}
+        for (item, cell), entries in sorted(lists.items(), key=lambda pair: pair[0]):
+            if entries is None or len(entries) > self.longest:
                 continue
             centre, radius = self.spheres[item]
             half = radius / math.sqrt(3.0)
