@@ -19,8 +19,10 @@ ALIKE += [("r-tree", {"split": split}) for split in ("linear", "quadratic")]
 ALIKE += [("sphere-tree", {}), ("obb-tree", {}), *(("kdop-tree", {"k": k}) for k in ("6", "14", "18", "26"))]
 ALIKE = [(name, {**parameters, "walk": walk}) for name, parameters in ALIKE for walk in ("depth-first", "best-first")]
 ALIKE += [("sorted-list", {"volume": volume}) for volume in ("aabb", "sphere", "obb", "kdop-14", "sphere & aabb", "aabb | aabb")]
+ALIKE += [("sorted-list", {"volume": volume, "around": "object"}) for volume in ("aabb", "sphere", "aabb | aabb")]
 TREES = [("bvh", {}), ("bvh", {"builder": "sah", "walk": "best-first"}), ("bvh", {"builder": "incremental"}), ("r-tree", {}), ("sphere-tree", {}),
-         ("obb-tree", {}), ("kdop-tree", {}), ("sorted-list", {}), ("sorted-list", {"volume": "aabb | aabb"}), ("sorted-list", {"volume": "sphere & aabb"})]
+         ("obb-tree", {}), ("kdop-tree", {}), ("sorted-list", {}), ("sorted-list", {"volume": "aabb | aabb"}), ("sorted-list", {"volume": "sphere & aabb"}),
+         ("sorted-list", {"volume": "obb", "around": "object"})]
 
 
 def label(value):
@@ -85,6 +87,20 @@ def test_sorted_list_stops_at_the_right_place():
         hits = build(scene, "sorted-list", core).closest([(-1.0, 0.0, 0.5)], [(1.0, 0.0, 0.0)], count=True)
         # Entries at 0, 4 and 8; the first is hit at 6.75, the second at 4: it is nearer, and the third is not tested.
         assert hits.primitive[0] == 1 and hits.t[0] == 5.0 and hits.n_it[0] == 2
+
+
+@pytest.mark.parametrize("core", ("pure", "fast"))
+def test_one_volume_an_object(core):
+    scene = animated(np.random.default_rng(2))
+    rays = datasets.rays_for(scene, np.random.default_rng(8))
+    index = build(scene, "sorted-list", core, volume="sphere", around="object")
+    cells = index.cells()
+    assert len(cells) == 1 + len(scene.objects) and cells.count.tolist() == [scene.n_primitives, *(len(o.geometry) for o in scene.objects)]
+    assert index.figures["N_E"] == len(scene.objects) and index.figures["N_ER"] == scene.n_primitives
+    hits, each = index.closest(*rays, count=True), build(scene, "sorted-list", core, volume="sphere").closest(*rays, count=True)
+    assert np.array_equal(hits.primitive, build(scene, "brute", core).closest(*rays).primitive)
+    # A volume entered, all that is in it is tested.
+    assert np.asarray(hits.n_it).sum() > 2 * np.asarray(each.n_it).sum() and set(np.asarray(hits.n_ets).tolist()) <= set(range(len(scene.objects) + 1))
 
 
 def animated(rng):

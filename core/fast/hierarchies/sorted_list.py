@@ -18,25 +18,35 @@ from .wide import along_curve
 PAIRS = 8_192
 #: Rays in a block.
 BLOCK = 64
+#: Pairs of rays and primitives tested at a time.
+TESTS = 131_072
 
 
 class SortedList(Structure):
-    """One volume a primitive.
+    """One volume a primitive, or an object.
 
     Attributes
     ----------
     volumes : Volumes
+    item, start, count : ndarray
+        Primitives, those in a volume together; where a volume's begin, and how many it has.
     """
 
-    def build(self, progress, volume):
+    def build(self, progress, volume, around="primitive"):
         n = self.primitives.n
-        self.volumes = maker(volume)(self.primitives, np.arange(n), np.arange(n))
+        self.item = self.start = np.arange(n)
+        if around == "object":
+            objects = np.concatenate([kind.object_of for kind in self.primitives.kinds])
+            self.item = np.argsort(objects, kind="stable")
+            self.start = np.flatnonzero(np.diff(objects[self.item], prepend=-1))
+        self.count = np.diff(self.start, append=n)
+        self.volumes = maker(volume)(self.primitives, self.item, self.start)
         self.measure()
 
     def measure(self):
         """Fill in the figures."""
-        n = self.primitives.n
-        self.figures.update(N_G=1, N_E=n, N_EE=0, N_ER=n, depth=1, memory=self.volumes.nbytes)
+        self.figures.update(N_G=1, N_E=len(self.volumes), N_EE=0, N_ER=self.primitives.n, depth=1,
+                            memory=self.volumes.nbytes + (self.item.nbytes + self.start.nbytes if len(self.volumes) < self.primitives.n else 0))
         self.lo, self.hi = (np.ascontiguousarray(c.T) for c in self.volumes.boxes())
 
     def traverse(self, rays, query):
@@ -44,9 +54,9 @@ class SortedList(Structure):
         order = self._neighbours(rays)
         lists = [self._met(values, query, block, self._near(rays, values, query, block))
                  for block in (order[start:start + BLOCK] for start in range(0, rays.n, BLOCK))]
-        ray, item, t_in = (np.concatenate(c) for c in zip(*lists))
+        ray, volume, t_in = (np.concatenate(c) for c in zip(*lists))
         order = np.argsort(ray, kind="stable")
-        ray, item, t_in = ray[order], item[order], t_in[order]
+        ray, volume, t_in = ray[order], volume[order], t_in[order]
         if query.counts:
             query.counts.steps(np.arange(rays.n))
         # The place of each ray's next volume, and the end of its list.
@@ -61,8 +71,20 @@ class SortedList(Structure):
             if query.counts:
                 query.counts.steps(going)
                 query.counts.elementary(going)
-            query.test(going, item[place[going]])
+            self._test(query, going, volume[place[going]])
             place[going] += 1
+
+    def _test(self, query, ray, volume):
+        """Test rays against all primitives of volumes, one a ray."""
+        if len(self.volumes) == self.primitives.n:      # one each
+            query.test(ray, self.item[volume])
+            return
+        count = self.count[volume]
+        end = np.cumsum(count)
+        for first in range(0, int(end[-1]), TESTS):
+            pair = np.arange(first, min(first + TESTS, int(end[-1])))
+            at = np.searchsorted(end, pair, side="right")
+            query.test(ray[at], self.item[self.start[volume[at]] + pair - (end - count)[at]])
 
     def _neighbours(self, rays):
         """An order of rays in which those come together that start, or enter the list's box, near each other and go the same way."""
@@ -128,9 +150,11 @@ class SortedList(Structure):
             shape = np.concatenate([np.full((1, shape.shape[1]), np.nan), shape])
         x, y, z = hi - lo
         area = np.concatenate([[2.0 * (x * y + y * z + z * x)], self.volumes.area()])
-        n, leaf = p.n, np.ones(p.n + 1, bool)
+        leaf = np.ones(len(self.volumes) + 1, bool)
         leaf[0] = False
-        return Cells.make(np.concatenate([[lo], p.lo]), np.concatenate([[hi], p.hi]), leaf, np.where(leaf, 1, n), leaf, leaf - 1, drawn, shape, area)
+        own_lo, own_hi = np.minimum.reduceat(p.lo[self.item], self.start), np.maximum.reduceat(p.hi[self.item], self.start)
+        return Cells.make(np.concatenate([[lo], own_lo]), np.concatenate([[hi], own_hi]), leaf, np.concatenate([[p.n], self.count]), leaf, leaf - 1,
+                          drawn, shape, area)
 
     def refit(self, scene):
         """Follow motion: volumes around where the primitives are now; as :meth:`.volume_tree.VolumeStructure.refit`."""
@@ -139,6 +163,5 @@ class SortedList(Structure):
 
     def refit_volumes(self):
         """Fit the volumes to where the primitives are now, and measure."""
-        n = self.primitives.n
-        self.volumes = self.volumes.refitted(self.primitives, np.arange(n), np.arange(n))
+        self.volumes = self.volumes.refitted(self.primitives, self.item, self.start)
         self.measure()
