@@ -393,7 +393,7 @@ def bench_options(sub):
     sub.add_argument("--seed", type=whole(0, 2**31 - 1), default=0)
     sub.add_argument("--growth", action="store_true", help="also how times grow from 1k to 1M triangles")
     sub.add_argument("--division", action="store_true", help="instead: what divides space, against brute force, its walks, lists and regions; "
-                     "with --growth from 1k to 1M triangles only")
+                     "with --growth only how they grow, from 1k triangles on; --subdivisions 5: to 1M")
     sub.add_argument("--automatic", action="store_true", help="instead: the automatic choice of techniques against each fixed one, on the procedural databases")
 
 
@@ -406,7 +406,7 @@ def bench_verb(call):
     if call.division:
         from .lab import division
         size = tuple(min(side, 128) for side in call.size)
-        result = {"growth": division.growth(size=size, say=say)} if call.growth else division.division(call.subdivisions, size, say=say)
+        result = {"growth": division.growth(range(call.subdivisions + 1), size, say)} if call.growth else division.division(call.subdivisions, size, say=say)
         record = report.record("bench", None, None, {"division": True, "subdivisions": call.subdivisions, "size": size, "growth": call.growth}, **result)
         return Outcome(division.text(result), record, DONE if result.get("met", True) else FAILED)
     from .lab import against_brute, bench

@@ -59,11 +59,12 @@ def bench(subdivisions=FULL_SIZE, size=(512, 512), repeats=5, seed=0, say=lambda
     scene, note = monkey_scene(subdivisions)
     left_out = [note] if note else []
     say(f"{scene.name}: {scene.n_primitives} triangles")
-    bvh, grid, octree = technique("bvh"), technique("grid"), technique("octree")
+    bvh = technique("bvh")
     builders = next(p for p in bvh.parameters if p.name == "builder")
     default = builders.default_in("fast")
     contestants = [Contestant("bvh", "fast", {"builder": b}) for b in sorted(builders.choices_in("fast"), key=lambda b: b != default)]
-    contestants += [Contestant(row.name) for row in (grid, octree)]
+    contestants += [Contestant("grid"), Contestant("grid", "fast", {"density": 64.0}), Contestant("macro-grid", "fast", {"density": 64.0}),
+                    Contestant("octree"), Contestant("kd-tree"), Contestant("kd-tree", "fast", {"clip": False})]
 
     engines, rows = {}, []
     for c in contestants:
@@ -90,8 +91,8 @@ def bench(subdivisions=FULL_SIZE, size=(512, 512), repeats=5, seed=0, say=lambda
         ask[name], per_ray[name] = calls(peer.engine, sets, seed)
         rows.append({"technique": name, "T_B": peer.figures["T_B"]})
     for label, index in engines.items():
-        # Grid and octree are tens of times slower than the bvh here: an eighth of the rays says as much.
-        own = sets if label.startswith("bvh") else [s.take(slice(None, None, 8)) for s in sets]
+        # Octree and kd-tree are many times slower than the bvh here: an eighth of the rays says as much.
+        own = sets if label.startswith(("bvh", "grid", "macro-grid")) else [s.take(slice(None, None, 8)) for s in sets]
         ask[label] = [lambda s=s, index=index: s.ask(index) for s in own]
         per_ray[label] = [len(s) for s in own]
 
