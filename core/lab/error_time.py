@@ -290,13 +290,15 @@ class _Sweep:
         scene = self.scenes[0]
         mirrors = any(m.reflects for m in scene.used_materials())
         soft = any(light.has_extent and any(light.colour) for light in scene.lights)
-        least = [(f"threshold {t:g}", {"threshold": t}) for t in (0.1, 0.03, 0.01)] if mirrors else [("as it is", {})]
-        rays = [(f"{n} shadow rays", {"light_samples": n}) for n in (1, 4, 16)] if soft else [("as it is", {})]
+        alone = [("as it is", {})]
+        least = [(f"threshold {t:g}", {"threshold": t}) for t in (0.1, 0.03, 0.01)] if mirrors else alone
+        rays = [(f"{n} shadow rays", {"light_samples": n}) for n in (1, 4, 16)] if soft else alone
         # Rays do not scatter: neither shall cones.
         for name, parameters, points in (("cones", {"gloss": False}, least), ("pyramids", {}, rays), ("beams", {}, rays)):
             index = build(scene, name, **parameters)
             if not {kind.KIND for kind in index.primitives.kinds} & set(index.SUPPORTED):
-                left_out.append(f"{name}: the scene has none of the primitives they can be tested against ({', '.join(index.SUPPORTED)}).")
+                known = ", ".join(index.SUPPORTED)
+                left_out.append(f"{name}: the scene has none of the primitives they can be tested against ({known}).")
                 continue
             self.indices[0, name] = index
             left_out += [f"{name}: {notice}" for notice in index.notices]

@@ -86,6 +86,7 @@ def unsupported(kinds, name, samples):
     return [
         Notice(
             ", ".join(sorted(set(kinds))),
-            f"such primitives cannot be tested against {name}; where they may be seen, {samples} rays are traced in place of each.",
+            f"such primitives cannot be tested against {name}; where they may be seen, {samples} rays are traced "
+            "in place of each.",
         )
     ]

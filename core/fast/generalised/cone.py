@@ -21,8 +21,8 @@ class Cones:
     t_min, t_max : ndarray, shape (n,)
     parallel : ndarray, shape (n,), bool
     start, away : ndarray, shape (3, n)
-        Point where the axis starts on a surface, and normal of it, on the cone's side: only what is beyond that plane is met;
-        zero for cones that start at no surface.
+        Point where the axis starts on a surface, and normal of it, on the cone's side: only what is beyond that plane
+        is met; zero for cones that start at no surface.
     leaving : ndarray, shape (2, n), int64
         Object and primitive of that surface, which it does not meet again; -1 for none.
     inside : ndarray, shape (n,), bool
@@ -45,7 +45,8 @@ class Cones:
     def free(cls, o, d, e, f, t_min, t_max, parallel, disc):
         """Cones that start at no surface."""
         n = o.shape[1]
-        return cls(o, d, e, f, t_min, t_max, parallel, o, np.zeros((3, n)), np.full((2, n), -1), np.zeros(n, bool), disc)
+        leaves = o, np.zeros((3, n)), np.full((2, n), -1), np.zeros(n, bool)
+        return cls(o, d, e, f, t_min, t_max, parallel, *leaves, disc)
 
     def take(self, index):
         """Some of the cones."""
@@ -77,7 +78,7 @@ class Cones:
         return self.o[:, cone] + np.where(parallel, shift, 0.0), self.d[:, cone] + np.where(parallel, 0.0, shift)
 
     def height(self, cone, point):
-        """How far points, one of each of the cones given, lie beyond the planes that these leave; in those planes, 0."""
+        """How far points, one for each of the cones given, lie beyond the planes that these leave; in them, 0."""
         p, away = point - self.start[:, cone], self.away[:, cone]
         height = dot(away, p)
         return np.where(np.abs(height) > FLAT * np.abs(p).max(axis=0, initial=0.0), height, 0.0)
@@ -101,8 +102,7 @@ class Reach:
         with np.errstate(divide="ignore"):
             # o - fixed + w (d - growing) <= hi, and o + fixed + w (d + growing) >= lo.
             self.bounds = [
-                (cones.o[a] - fixed[a], 1.0 / (cones.d[a] - growing[a]), cones.o[a] + fixed[a], 1.0 / (cones.d[a] + growing[a]))
-                for a in range(3)
+                (o - r, 1.0 / (d - g), o + r, 1.0 / (d + g)) for o, d, r, g in zip(cones.o, cones.d, fixed, growing)
             ]
 
     def met(self, cone, lo, hi, box):

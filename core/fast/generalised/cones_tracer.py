@@ -53,7 +53,10 @@ class ConeTracer(FootprintTracer):
             self.lights = [(light, 1.0) for light in scene.lights if any(light.colour)]
 
     def visible(self, outlines):
-        """See :class:`FootprintTracer`. What hides what is judged at points of the aperture, as in the A-buffer (Carpenter 1984)."""
+        """See :class:`FootprintTracer`.
+
+        What hides what is judged at points of the aperture, as in the A-buffer (Carpenter 1984).
+        """
         share, s, t = outlines.share.copy(), outlines.s.copy(), outlines.t.copy()
         rows, start, group = _groups(outlines.cone)
         if not len(rows):
@@ -236,7 +239,7 @@ class ConeTracer(FootprintTracer):
 
 
 def _groups(cone):
-    """Pieces that share their cone with others: their rows, where each cone's begin among these, and the cone of each."""
+    """Pieces that share their cone with others: their rows, where each cone's begin among these, and whose each is."""
     first = np.flatnonzero(np.diff(cone, prepend=-1))
     size = np.diff(first, append=len(cone))
     several = size > 1

@@ -6,7 +6,6 @@ apex: only what is in front counts (Olano and Greer 1997).
 """
 
 import math
-from functools import cached_property
 
 import numpy as np
 
@@ -18,12 +17,12 @@ from . import clipping
 POINTS = 64
 #: Chords by which a conic's share of the aperture is measured.
 CHORDS = 16
-#: Shares below this are none, and above 1 less this all.
+#: Shares below this are none.
 LEAST = 1e-12
 
 
 def points(disc, n=POINTS):
-    """n points spread evenly over an aperture, shape (2, n): Vogel's spiral in the disc, a rank-1 lattice in the square."""
+    """n points spread evenly over an aperture, shape (2, n): Vogel's spiral in the disc, a lattice in the square."""
     k = np.arange(n) + 0.5
     if disc:
         r, angle = np.sqrt(k / n), math.pi * (3.0 - math.sqrt(5.0)) * k
@@ -185,7 +184,7 @@ class Outlines:
         nx, ny, nw = ay * bw - aw * by, aw * bx - ax * bw, ax * by - ay * bx
         total = nx * x[0] + ny * y[0] + nw * w[0]
         self.plane = np.stack([nx, ny, nw, total])
-        # w is (total - p (nx s + ny t)) / (nw + (1 - p) (nx s + ny t)), p = 1 in parallel cones; it counts where it is positive.
+        # w is (total - p (nx s + ny t)) / (nw + (1 - p) (nx s + ny t)), p = 1 in parallel cones.
         p = parallel.astype(float)
         for k, limit, sign in ((3, cones.t_min[cone], 1.0), (4, cones.t_max[cone], -1.0)):
             some = np.isfinite(limit) & (parallel | (limit > 0.0))

@@ -26,7 +26,7 @@ class PyramidTracer(FootprintTracer):
 
     def visible(self, outlines):
         """See :class:`FootprintTracer`."""
-        corners, count = within_lines(outlines.lines) if len(outlines) else (np.zeros((0, 4, 2)), np.zeros(0, np.int64))
+        corners, count = within_lines(outlines.lines) if len(outlines) else within_lines(np.zeros((0, 1, 3)))
         first = np.flatnonzero(np.diff(outlines.cone, prepend=-1))
         size = np.diff(first, append=len(outlines))
         begin, number = np.repeat(first, size), np.repeat(size, size)
@@ -42,7 +42,8 @@ class PyramidTracer(FootprintTracer):
             # Of two at the same place the first is seen; what lies behind all over the pixel hides nothing.
             reach = np.abs(line[:, 0]) + np.abs(line[:, 1])
             hides = there & np.where(same, other < owner, line[:, 2] > -reach)
-            hides &= (least[other] < most[owner]).all(axis=1) & (most[other] > least[owner]).all(axis=1) & (count >= 3)
+            overlap = (least[other] < most[owner]) & (most[other] > least[owner])
+            hides &= overlap.all(axis=1) & (count >= 3)
             some, rest = np.flatnonzero(hides), np.flatnonzero(~hides & (count >= 3))
             if not len(some):
                 continue

@@ -22,7 +22,8 @@ class Cone:
     t_min, t_max : float
     parallel : bool
     start, away : tuple of 3 float, or None
-        Point where the axis starts on a surface, and normal of it, on the cone's side: only what is beyond that plane is met.
+        Point where the axis starts on a surface, and normal of it, on the cone's side: only what is beyond that plane
+        is met.
     leaving : (int, int) or None
         Object and primitive of that surface, which it does not meet again.
     inside : bool

@@ -50,7 +50,10 @@ class ConeTracer(FootprintTracer):
             self.lights = [(light, 1.0) for light in scene.lights if any(light.colour)]
 
     def visible(self, outlines):
-        """See :class:`FootprintTracer`. What hides what is judged at points of the aperture, as in the A-buffer (Carpenter 1984)."""
+        """See :class:`FootprintTracer`.
+
+        What hides what is judged at points of the aperture, as in the A-buffer (Carpenter 1984).
+        """
         if len(outlines) < 2:
             return [(outline, outline.share, outline.s, outline.t) for outline in outlines]
         places = points(outlines[0].cone.disc)
@@ -66,7 +69,7 @@ class ConeTracer(FootprintTracer):
                 part = won / covered
             else:
                 # What lies between the points is in front, or not, where it is nearest to one.
-                at = min(range(len(places)), key=lambda k: (outline.s - places[k][0]) ** 2 + (outline.t - places[k][1]) ** 2)
+                at = min(range(len(places)), key=lambda k: math.dist((outline.s, outline.t), places[k]))
                 part = 1.0 if outline.distance(outline.s, outline.t) < nearest[at] else 0.0
             s, t = outline.s, outline.t
             if part < 1.0 and won > 0.0:
@@ -96,7 +99,8 @@ class ConeTracer(FootprintTracer):
         else:
             e, f = (times(light.radius, axis) for axis in frame(unit(to)))
         disc = light.kind != "area" or light.shape == "ellipse"
-        cone = Cone(o, d, e, f, 0.0, t_max, False, surface.point, surface.normal, surface.place, not surface.outside, disc)
+        leaves = surface.point, surface.normal, surface.place, not surface.outside
+        cone = Cone(o, d, e, f, 0.0, t_max, False, *leaves, disc)
         structure = self.probe["shadow"].structure
         outlines, sampled, n_it, n_ts = structure.within(cone)
         if sampled:
@@ -139,7 +143,8 @@ class ConeTracer(FootprintTracer):
         if kind == TRANSPARENT:
             t_min = t + math.sqrt(area / dot(old.d, old.d))
             onward = times(-1.0, surface.normal)
-            cone = replace(old, t_min=t_min, start=o, away=onward, leaving=surface.place, inside=surface.outside, disc=True)
+            leaves = {"start": o, "away": onward, "leaving": surface.place, "inside": surface.outside}
+            cone = replace(old, t_min=t_min, **leaves)
         else:
             spread = [
                 self._turned(path, surface, kind, direction, wide, across) for wide, across in ((old.e, e), (old.f, f))

@@ -95,7 +95,8 @@ class FootprintTracer(Whitted):
         outlines, sampled, n_it, n_ts = structure.within(path.cone)
         if sampled:
             share = 1.0 / self.rays_each
-            return [self._traced(path.narrowed(s, t, share).as_ray()) for s, t in points(path.cone.disc, self.rays_each)]
+            places = points(path.cone.disc, self.rays_each)
+            return [self._traced(path.narrowed(s, t, share).as_ray()) for s, t in places]
         parts, left = [], 1.0
         for outline, share, s, t in self.visible(outlines):
             hit = hit_of(structure, outline, s, t) if share > 0.0 else None

@@ -34,7 +34,7 @@ def points(disc, n=POINTS):
 
 
 def pieces_of(primitive, supported):
-    """The pieces that a primitive consists of, triangles (three corners each) or the sphere itself; none: not supported."""
+    """The pieces of a primitive: triangles (three corners each), or the sphere itself; none where it is not supported."""
     if primitive.KIND not in supported:
         return []
     if primitive.KIND == "sphere":
@@ -90,7 +90,7 @@ class Flat(Outline):
         n = cross(minus(p[1], p[0]), minus(p[2], p[0]))
         total = dot(n, p[0])
         self.plane = (*n, total)
-        # w is (total - p (nx s + ny t)) / (nw + (1 - p) (nx s + ny t)), p = 1 in parallel cones; it counts where it is positive.
+        # w is (total - p (nx s + ny t)) / (nw + (1 - p) (nx s + ny t)), p = 1 in parallel cones.
         for limit, sign in ((cone.t_min, 1.0), (cone.t_max, -1.0)):
             if math.isfinite(limit) and (cone.parallel or limit > 0.0):
                 rate = -sign * (1.0 if cone.parallel else limit)
@@ -226,7 +226,9 @@ def chords(conic, front, pointed, disc):
     else:
         us, ut = (1.0, 0.0) if abs(gs) >= abs(gt) else (0.0, 1.0)
     vs, vt = -ut, us
-    uu, vv = (conic[0][0] * a * a + 2.0 * conic[0][1] * a * b + conic[1][1] * b * b for a, b in ((us, ut), (vs, vt)))
+    uu, vv = (
+        conic[0][0] * a * a + 2.0 * conic[0][1] * a * b + conic[1][1] * b * b for a, b in ((us, ut), (vs, vt))
+    )
     uv = conic[0][0] * us * vs + conic[0][1] * (us * vt + ut * vs) + conic[1][1] * ut * vt
     u1, v1, one = conic[0][2] * us + conic[1][2] * ut, conic[0][2] * vs + conic[1][2] * vt, conic[2][2]
     # Chords where there is any of an ellipse.
