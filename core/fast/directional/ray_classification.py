@@ -11,18 +11,21 @@ animation with the same primitives, cells have time as a sixth dimension: one bu
 
 import numpy as np
 
+from ...catalogue import technique
 from ...errors import Notice, SceneError
+from ...parameters import resolve
 from ..primitives import Primitives
 from ..rays import Rays
 from ..structure import Structure
 from .beam import FRAME, M, ROUNDING, Bounds
 from .hypercubes import Hypercubes
-from .second import _second
 
 #: Entries of its list that a ray is tested with in the first round; each round doubles them.
 FIRST_ROUND = 4
 #: Pairs tested together.
 PAIRS = 65_536
+#: The technique inside instances.
+INSIDE = "bvh"
 
 
 class RayClassification(Structure):
@@ -267,6 +270,12 @@ class _Tests:
             self.query.test(self.ray.take(which), item)
 
 
+def _inner(primitives):
+    """The structure over a mesh that instances share."""
+    row = technique(INSIDE)
+    return row.load("fast")(primitives, resolve(INSIDE, row.parameters, {}, "fast"))
+
+
 class _Inside:
     """Builds the structures inside instances: a mesh that did not change from the frame before keeps its own."""
 
@@ -279,7 +288,7 @@ class _Inside:
                                                    primitives.kinds[0].xyz if primitives.n else []):
             self.made.append(self.before[k])
         else:
-            self.made.append(_second(primitives))
+            self.made.append(_inner(primitives))
         return self.made[-1]
 
 

@@ -11,13 +11,17 @@ animation with the same primitives, cells have time as a sixth dimension: one bu
 
 import math
 
+from ...catalogue import technique
 from ...errors import Notice, SceneError
+from ...parameters import resolve
 from ..primitives import primitives_of
 from ..ray import Ray
 from ..structure import Structure
 from .beam import ROUNDING, Bounds
 from .hypercubes import Hypercubes
-from .second import _second
+
+#: The technique inside instances.
+INSIDE = "bvh"
 
 
 class RayClassification(Structure):
@@ -189,6 +193,12 @@ class OneFrame(Structure):
         return self.owner.cells()
 
 
+def _inner(primitives):
+    """The structure over a mesh that instances share."""
+    row = technique(INSIDE)
+    return row.load("pure")(primitives, resolve(INSIDE, row.parameters, {}, "pure"))
+
+
 class _Inside:
     """Builds the structures inside instances: a mesh that did not change from the frame before keeps its own."""
 
@@ -199,7 +209,7 @@ class _Inside:
         corners = [(p.a, p.b, p.c) for p in primitives]
         k = len(self.made)
         old = self.before[k] if k < len(self.before) else (None, None)
-        self.made.append(old if old[0] == corners else (corners, _second(primitives)))
+        self.made.append(old if old[0] == corners else (corners, _inner(primitives)))
         return self.made[-1][1]
 
 
