@@ -1,4 +1,4 @@
-"""One build for all frames of an animation: ray classification with time as the sixth dimension (Arvo and Kirk 1987, section 8).
+"""One build for all frames of an animation: ray classification with time as the sixth dimension (Arvo and Kirk 1987).
 
 Cells made for one frame serve the others, for as long as they hold its time; what moves is bounded over all that time. The
 table says what that costs against a structure for each frame, and whether the hits are those of brute force.
@@ -60,7 +60,8 @@ def frames(scenes, numbers, core="fast", n_rays=2000, seed=0, parameters=None, s
         bvh, seconds_bvh = _timed(lambda: build(scene, "bvh", core))
         brute = build(scene, "brute", core)
         sets = ray_sets(scene, bvh, n_rays, seed)
-        row = {"frame": number, "rays": sum(map(len, sets)), "one build": 0.0, "alone": seconds_own, "bvh": seconds_bvh, "differ": 0, "checked": 0}
+        row = {"frame": number, "rays": sum(map(len, sets)), "one build": 0.0, "alone": seconds_own, "bvh": seconds_bvh}
+        row |= {"differ": 0, "checked": 0}
         tests = {"N_IT": 0, "N_IT alone": 0}
         for rays in sets:
             answer, seconds = _timed(lambda: rays.ask(index.at(k)))
@@ -94,6 +95,6 @@ def text(result):
     """The result for people."""
     from . import report
     total = {name: sum(row[name] for row in result["rows"]) for name in ("one build", "alone", "bvh")}
-    return "\n".join([
-        report.table(result["rows"], COLUMNS), "", *(f"{name}: {meaning}" for name, meaning in MEANINGS.items()), "",
-        f"{len(result['rows'])} frames: one build {result['T_B'] + total['one build']:.3g} s, a build for each {total['alone']:.3g} s, a bvh for each {total['bvh']:.3g} s."])
+    words = (f"{len(result['rows'])} frames: one build {result['T_B'] + total['one build']:.3g} s, a build for each {total['alone']:.3g} s, "
+             f"a bvh for each {total['bvh']:.3g} s.")
+    return "\n".join([report.table(result["rows"], COLUMNS), "", *(f"{name}: {meaning}" for name, meaning in MEANINGS.items()), "", words])

@@ -3,7 +3,7 @@
 A face is the dominant axis of a direction: 0 to 5 are +x, -x, +y, -y, +z, -z. Along it, a ray's coordinate m (the negated
 one for a negative axis) only grows; b and c are the coordinates along the two axes that follow, u and v how much they
 change when m grows by 1, each within [-1, 1]. A beam is convex, and lies between four planes in which b or c changes with
-m; what lies beyond one of them, or before the origins, no ray of the beam meets (Arvo and Kirk 1987, section 5).
+m; what lies beyond one of them, or before the origins, no ray of the beam meets (Arvo and Kirk 1987).
 """
 
 from functools import cached_property

@@ -35,8 +35,8 @@ PLACE = np.array([[bin(mask & ((1 << k) - 1)).count("1") for mask in range(64)] 
 PARTS = 1 << np.array([bin(mask).count("1") for mask in range(64)])
 
 #: The columns besides `lo` and `hi`, and the bytes of a cell in all of them.
-COLUMNS = {"root": np.int32, "parent": np.int32, "level": np.int32, "start": np.int64, "count": np.int32, "owner": np.int32, "twin": np.int32, "mask": np.uint8,
-           "first": np.int64, "useless": np.uint8, "stamp": np.int32}
+COLUMNS = {"root": np.int32, "parent": np.int32, "level": np.int32, "start": np.int64, "count": np.int32, "owner": np.int32,
+           "twin": np.int32, "mask": np.uint8, "first": np.int64, "useless": np.uint8, "stamp": np.int32}
 CELL = 12 * 8 + sum(np.dtype(dtype).itemsize for dtype in COLUMNS.values())
 
 
@@ -164,8 +164,8 @@ class Hypercubes:
         else:
             start, owner = self.start[self.roots[face]], self.roots[face]
         mask = self._wide(lo, hi, np.array([number]), np.array([start]), np.array([self.bounds.n]))
-        self.roots[number] = self._add(lo, hi, root=number, parent=-1, level=0, start=start, count=self.bounds.n, owner=owner, twin=self.n, mask=mask,
-                                       first=-1, useless=0, stamp=self.now)[0]
+        self.roots[number] = self._add(lo, hi, root=number, parent=-1, level=0, start=start, count=self.bounds.n, owner=owner,
+                                       twin=self.n, mask=mask, first=-1, useless=0, stamp=self.now)[0]
 
     def _wide(self, lo, hi, root, start, count):
         """Along which axes cells are divided: masks."""
@@ -338,9 +338,9 @@ class Hypercubes:
         lo, hi = (np.concatenate([end[k] for end in ends], axis=1) for k in (0, 1))
         twice = np.tile(parent, 2)
         start, n = start.ravel(), n.ravel()
-        added = self._add(lo, hi, root=self.root[twice], parent=twice, level=self.level[twice] + 1, start=start, count=n, owner=owner.ravel(),
-                          twin=number[::-1].ravel(), mask=self._wide(lo, hi, self.root[twice], start, n), first=-1, useless=useless.ravel(),
-                          stamp=self.now)
+        mask = self._wide(lo, hi, self.root[twice], start, n)
+        added = self._add(lo, hi, root=self.root[twice], parent=twice, level=self.level[twice] + 1, start=start, count=n, mask=mask,
+                          owner=owner.ravel(), twin=number[::-1].ravel(), first=-1, useless=useless.ravel(), stamp=self.now)
         self.shared += int(((owner != number).ravel() & (n > 0)).sum())
         self.parts[self.first[twice] + np.concatenate([2 * pair, 2 * pair + 1])] = added
         return True
@@ -381,7 +381,8 @@ class Hypercubes:
         some = np.flatnonzero(divided)
         sizes = PARTS[mask[some]]
         begin = np.cumsum(sizes) - sizes
-        self.parts = number.take(self.parts.take(np.repeat(first[some] - begin, sizes) + np.arange(int(sizes.sum())))).astype(np.int32)
+        old = self.parts.take(np.repeat(first[some] - begin, sizes) + np.arange(int(sizes.sum())))
+        self.parts = number.take(old).astype(np.int32)
         self.n_parts = len(self.parts)
 
         self.lo, self.hi = self.lo[:, kept], self.hi[:, kept]

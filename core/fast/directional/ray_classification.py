@@ -53,8 +53,9 @@ class RayClassification(Structure):
             inside = _Inside(inside)
             frames.append(Primitives.of(one, inside))
             if not same_primitives(frames[0], frames[-1]):
-                raise SceneError(f"{row.name}: scene {k} of the list, {one.name!r}, has other primitives than the first, so they are no frames of one "
-                                 "animation. Leave out what appears, disappears or changes its faces, or build each frame on its own.")
+                raise SceneError(f"{row.name}: scene {k} of the list, {one.name!r}, has other primitives than the first, so they are no "
+                                 "frames of one animation. Leave out what appears, disappears or changes its faces, or build each frame "
+                                 "on its own.")
         index = cls(frames[0], parameters, progress, frames)
         index.scenes, index.scene, index.technique = scenes, scenes[0], row
         return index
@@ -152,8 +153,9 @@ class RayClassification(Structure):
     def _say_so(self):
         """Tell that the byte limit is too small."""
         if not any("max_bytes" in n.text for n in self.notices):
-            self.notices.append(Notice("ray-classification", f"max_bytes = {self.parameters['max_bytes']:g} is too small: some cells were not divided, "
-                                       "though all others had been given up, so their lists are long. Raise max_bytes."))
+            text = (f"max_bytes = {self.parameters['max_bytes']:g} is too small: some cells were not divided, though all others had been "
+                    "given up, so their lists are long. Raise max_bytes.")
+            self.notices.append(Notice("ray-classification", text))
 
     def beam(self, origin, direction, frame=0):
         """The smallest cell that there is now for a ray: what to draw of it, and what it may hit.
@@ -186,7 +188,8 @@ class OneFrame(Structure):
 
     def __init__(self, owner, frame):
         self.owner, self.frame = owner, frame
-        self.primitives, self.parameters, self.figures, self.notices = owner.frames[frame], owner.parameters, owner.figures, owner.notices
+        self.primitives, self.parameters = owner.frames[frame], owner.parameters
+        self.figures, self.notices = owner.figures, owner.notices
         self.scene, self.technique = owner.scenes[frame], owner.technique
 
     def traverse(self, rays, query):

@@ -3,7 +3,7 @@
 A face is the dominant axis of a direction: 0 to 5 are +x, -x, +y, -y, +z, -z. Along it, a ray's coordinate m (the negated
 one for a negative axis) only grows; b and c are the coordinates along the two axes that follow, u and v how much they
 change when m grows by 1, each within [-1, 1]. A beam is convex, and lies between four planes in which b or c changes with
-m; what lies beyond one of them, or before the origins, no ray of the beam meets (Arvo and Kirk 1987, section 5).
+m; what lies beyond one of them, or before the origins, no ray of the beam meets (Arvo and Kirk 1987).
 """
 
 import functools
@@ -73,10 +73,13 @@ class Beam:
         # A box holds all that moves; what stands still is looked at itself.
         self.primitives = bounds.frames[first] if last - first == 1 else None
         self.sides = []
-        for column, slope, end in ((2 * self.b, hi[U], hi[B]), (2 * self.b + 1, -lo[U], -lo[B]), (2 * self.c, hi[V], hi[C]), (2 * self.c + 1, -lo[V], -lo[C])):
-            # x <= end + slope (m - m0), m0 being the first origin's or, where the slope is negative, the last one's; then also x <= end.
+        for column, slope, end in ((2 * self.b, hi[U], hi[B]), (2 * self.b + 1, -lo[U], -lo[B]),
+                                   (2 * self.c, hi[V], hi[C]), (2 * self.c + 1, -lo[V], -lo[C])):
+            # x <= end + slope (m - m0), m0 being the first origin's or, where the slope is negative, the last one's; then also
+            # x <= end.
             up, down = max(slope, 0.0), min(slope, 0.0)
-            self.sides.append((column, slope, up, down, end - up * lo[M] - down * hi[M] + slack, end + slack if slope < 0.0 else float("inf")))
+            limit, most = end - up * lo[M] - down * hi[M] + slack, end + slack if slope < 0.0 else float("inf")
+            self.sides.append((column, slope, up, down, limit, most))
 
     def meets(self, item):
         """Whether a primitive and the beam may have a point in common; never wrongly not."""

@@ -49,8 +49,9 @@ class RayClassification(Structure):
             inside = _Inside(inside)
             frames.append(primitives_of(one, inside))
             if list(map(_same, frames[0])) != list(map(_same, frames[-1])):
-                raise SceneError(f"{row.name}: scene {k} of the list, {one.name!r}, has other primitives than the first, so they are no frames of one "
-                                 "animation. Leave out what appears, disappears or changes its faces, or build each frame on its own.")
+                raise SceneError(f"{row.name}: scene {k} of the list, {one.name!r}, has other primitives than the first, so they are no "
+                                 "frames of one animation. Leave out what appears, disappears or changes its faces, or build each frame "
+                                 "on its own.")
         index = cls(frames[0], parameters, progress, frames)
         index.scenes, index.scene, index.technique = scenes, scenes[0], row
         return index
@@ -102,7 +103,7 @@ class RayClassification(Structure):
             self._say_so()
 
     def _enter(self, frame, ray, t_max):
-        """Where a ray enters the scene's box: t, dominant axis, M to FRAME, and what its positions may be off by; None where it misses."""
+        """Where a ray enters the scene's box: t, dominant axis, M to FRAME, what its positions may be off by; None for a miss."""
         slack = ROUNDING * max(*map(abs, ray.o), self.bounds.extent)
         begin, end = ray.t_min, t_max
         for o, d, inverse, low, high in zip(ray.o, ray.d, ray.inverse, *self.bounds.box):
@@ -150,8 +151,9 @@ class RayClassification(Structure):
     def _say_so(self):
         """Tell that the byte limit is too small."""
         if not any("max_bytes" in n.text for n in self.notices):
-            self.notices.append(Notice("ray-classification", f"max_bytes = {self.parameters['max_bytes']:g} is too small: some cells were not divided, "
-                                       "though all others had been given up, so their lists are long. Raise max_bytes."))
+            text = (f"max_bytes = {self.parameters['max_bytes']:g} is too small: some cells were not divided, though all others had been "
+                    "given up, so their lists are long. Raise max_bytes.")
+            self.notices.append(Notice("ray-classification", text))
 
     def beam(self, origin, direction, frame=0):
         """The smallest cell that there is now for a ray: what to draw of it, and what it may hit.
@@ -183,7 +185,8 @@ class OneFrame(Structure):
 
     def __init__(self, owner, frame):
         self.owner, self.frame = owner, frame
-        self.primitives, self.parameters, self.figures, self.notices = owner.frames[frame], owner.parameters, owner.figures, owner.notices
+        self.primitives, self.parameters = owner.frames[frame], owner.parameters
+        self.figures, self.notices = owner.figures, owner.notices
         self.scene, self.technique = owner.scenes[frame], owner.technique
 
     def walk(self, query):
