@@ -1,49 +1,24 @@
-"""Handing over: what directional techniques do with rays that they were not made for."""
+"""Handing over rays, batch by batch."""
 
-from ...catalogue import technique
-from ...errors import Notice
-from ...parameters import resolve
+from ...handing import HandingOver
 from ..primitives import Primitives
 from ..query import Closest, Counts
 from ..structure import Structure
 
-#: The technique that takes such rays, and is inside instances.
-SECOND = "bvh"
 
+class Handing(HandingOver, Structure):
+    """Base of techniques that serve some rays only, and hand the others to a second one."""
 
-class Handing(Structure):
-    """Base of techniques that serve some rays only, and hand the others to a second one, built when the first of them comes.
-
-    Attributes
-    ----------
-    scene : Scene or None
-        Whose camera and lights the technique is made for.
-    """
-
-    def __init__(self, primitives, parameters, progress=None, scene=None):
-        self.scene, self._second = scene, None
-        super().__init__(primitives, parameters, progress)
-
-    @classmethod
-    def over(cls, scene, row, parameters, progress=None):
-        primitives = Primitives.of(scene, lambda geometry: _second(geometry, progress))
-        index = cls(primitives, parameters, progress, scene)
-        index.technique = row
-        return index
+    core = "fast"
+    primitives_of = staticmethod(Primitives.of)
 
     @property
     def second(self):
-        """The structure for all other rays."""
+        """The structure for all other rays; its memory counts, but that of instances has been counted."""
         if self._second is None:
-            self._second = _second(self.primitives)
             inside = sum(s.figures["memory"] for s in self.primitives.structures())
-            self.figures["memory"] += self._second.figures["memory"] - inside
+            self.figures["memory"] += super().second.figures["memory"] - inside
         return self._second
-
-    def needs(self, what, advice):
-        """The notice that there is not what the technique is made for."""
-        name = self.scene.name if self.scene is not None else "scene"
-        return Notice(name, f"there is not {what}, so all rays are handed over to {SECOND}. {advice}")
 
     def hand_over(self, rays, query, which=None):
         """Let the second structure answer for some rays of a batch, or for all."""
@@ -60,8 +35,3 @@ class Handing(Structure):
             query.blocked[which] = part.blocked
         if query.counts:
             query.counts.add(which, part.counts)
-
-
-def _second(primitives, progress=None):
-    row = technique(SECOND)
-    return row.load("fast")(primitives, resolve(SECOND, row.parameters, {}, "fast"), progress)
