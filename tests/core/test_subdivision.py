@@ -373,3 +373,20 @@ def test_surface_area_heuristic_and_clipping_pay():
     assert sah < 0.9 * middle, (sah, middle)
     loose = build(scene, "kd-tree", clip=False).figures["c_SAH"]
     assert sah < 0.9 * loose, (sah, loose)
+
+
+@pytest.mark.parametrize("name", ["octree", "kd-tree", "bsp-tree"])
+def test_builds_can_be_stopped_at_any_time(name):
+    """Progress is told often, and what listens may stop the build: hundreds of times in a build that takes a second or two."""
+    scene, fractions = soup(4000, 0.01), []
+    build(scene, name, progress=fractions.append)
+    assert len(fractions) > 50 and fractions == sorted(fractions) and fractions[-1] <= 1.0
+
+    class Stop(Exception):
+        pass
+
+    def stop(fraction):
+        raise Stop
+
+    with pytest.raises(Stop):
+        build(scene, name, progress=stop)

@@ -65,6 +65,7 @@ class BspTree(CellTree):
         tolerance = TOLERANCE * self.margin
         best, plane = np.full(m, np.inf), np.full((4, m), np.inf)
         for normal, distance in self._candidates(cells, cell):
+            self.tick()
             low, high = self._extent(cells, normal.take(cell, axis=1))
             w = distance.take(cell)
             below, above = low < w - tolerance, high > w + tolerance

@@ -14,7 +14,7 @@ from .growth import Cells
 from .tree import CellTree
 
 #: Pairs of a primitive and a cell clipped together.
-PAIRS = 65_536
+PAIRS = 16_384
 
 
 class KdTree(CellTree):
@@ -89,6 +89,7 @@ class KdTree(CellTree):
             return own_lo, own_hi
         margin = self.margin
         for start in range(0, len(item), PAIRS):
+            self.tick()
             some = slice(start, start + PAIRS)
             low, high = self.primitives.clip(item[some], lo[some] - margin, hi[some] + margin)
             own_lo[some], own_hi[some] = np.maximum(own_lo[some], low - margin), np.minimum(own_hi[some], high + margin)
@@ -113,6 +114,7 @@ class KdTree(CellTree):
         high = cell << POSITION_BITS + 2
         positions = np.empty((2, 3, n), np.int64)
         for a in range(3):
+            self.tick()
             scale, offset = np.repeat(POSITIONS / size[:, a], count), np.repeat(cells.lo[:, a], count)
             begins = np.floor((cells.more[0][:, a] - offset) * scale, out=positions[1, a], casting="unsafe")
             ends = np.ceil((cells.more[1][:, a] - offset) * scale, out=positions[0, a], casting="unsafe")

@@ -69,6 +69,7 @@ class Octree(CellTree):
         child = cell[pair >> 3] * 8 + (pair & 7)
         reaches = np.zeros(len(pair), bool)
         for start in range(0, len(pair), PAIRS):
+            self.tick()
             some = slice(start, start + PAIRS)
             reaches[some] = p.overlaps(item[pair[some] >> 3], lo[child[some]] - margin, hi[child[some]] + margin)
         pair = np.concatenate([np.flatnonzero(inside & sure[:, None]), pair[reaches]])

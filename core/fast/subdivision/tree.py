@@ -50,7 +50,14 @@ class CellTree(Structure):
 
     def grow(self, root, progress, stop, max_depth, leaf_size, max_bytes, walk, lists):
         """Grow the tree and measure it."""
-        more = self.MORE_BYTES + 24 * (walk == "links")
+        more, done = self.MORE_BYTES + 24 * (walk == "links"), [0.0]
+
+        def tell(fraction):
+            done[0] = fraction
+            progress(fraction)
+
+        # Within a division: nothing more is done, but who listens may stop it.
+        self.tick = lambda: progress(done[0])
         self.tree = t = growth.grow(
             self.divide_cells,
             root,
@@ -62,12 +69,13 @@ class CellTree(Structure):
             max_bytes,
             NODE_BYTES + more,
             REFERENCE_BYTES,
-            progress,
+            tell,
             self.NAME,
             self.notices,
         )
+        self.tick()
         self.lists = Lists(np.repeat(np.arange(t.n), t.count), t.item, t.n, lists == "shared")
-        del t.item, t.count
+        del t.item, t.count, self.tick
         self.links = self.linked() if walk == "links" else None
         leaf = t.child < 0
         count = self.lists.count
