@@ -181,11 +181,17 @@ def convex_pieces(corners, normal):
         around = np.where(around > np.pi, around - 2.0 * np.pi, np.where(around <= -np.pi, around + 2.0 * np.pi, around))
         if abs(abs(around.sum()) - 2.0 * np.pi) < 1e-6:
             return [corners[keep[:1] + keep[a:a + CORNERS - 1]] for a in range(1, len(keep) - 1, CORNERS - 2)]
-    ears = []
+    ears, good = [], [_ear(flat, keep, i, sign) for i in range(len(keep))]
     while len(keep) > 3:
-        best = max(range(len(keep)), key=lambda i: _ear(flat, keep, i, sign))
+        best = max(range(len(keep)), key=good.__getitem__)
+        if not good[best][0]:
+            # What stood in the way of an ear may be gone.
+            good = [_ear(flat, keep, i, sign) for i in range(len(keep))]
+            best = max(range(len(keep)), key=good.__getitem__)
         ears.append(corners[[keep[best - 1], keep[best], keep[(best + 1) % len(keep)]]])
-        del keep[best]
+        del keep[best], good[best]
+        for i in (best - 1, best % len(keep)):
+            good[i] = _ear(flat, keep, i, sign)
     ears.append(corners[keep])
     return ears
 
@@ -203,13 +209,12 @@ def _ear(flat, keep, i, sign):
     if area <= 0.0:
         # A corner where the outline turns back upon itself, or goes straight on, can go; a reflex one cannot.
         return (1, 0.0) if area == 0.0 else (0, area)
-    for k in keep:
-        p = flat[k]
-        if any((p == q).all() for q in (a, b, c)):
-            continue
-        if all(sign * _turn(q, r, p) >= 0.0 for q, r in ((a, b), (b, c), (c, a))):
-            return 0, -area
-    return 1, area / longest
+    x, y = flat[keep].T
+    blocks = np.ones(len(keep), bool)
+    for p, q in ((a, b), (b, c), (c, a)):
+        blocks &= sign * ((q[0] - p[0]) * (y - p[1]) - (q[1] - p[1]) * (x - p[0])) >= 0.0
+        blocks &= (x != p[0]) | (y != p[1])
+    return (0, -area) if blocks.any() else (1, area / longest)
 
 
 def _box(obj, solid):
