@@ -10,13 +10,16 @@ import itertools
 import math
 import time
 from dataclasses import dataclass, field
+from pathlib import Path
 
 import numpy as np
 
 from ..catalogue import build, technique, techniques
 from ..errors import RayscopeError
 from ..options import AUTOMATIC, STANDARD
+from ..scene.camera import Camera
 from ..scene.layout import Layout, to_world
+from ..scene.light import Light
 from ..scene.scene import Mesh, Scene
 from . import report
 from .rays import ray_sets
@@ -30,7 +33,7 @@ FEW = 100
 SCENES = {"fast": ((40, False), (700, False), (250, True)), "pure": ((16, False), (150, False), (60, True))}
 #: Rays of each kind: numpy's calls cost the same for few rays as for many, so the seconds of a ray are those by which
 #: more rays take longer than fewer.
-RAYS = {"fast": (2000, 100), "pure": (40, 8)}
+RAYS = {"fast": (1000, 100), "pure": (40, 8)}
 #: A batch with more tests than this is not run: the smaller one has to do.
 TESTS = 90_000
 #: A technique whose time per ray is wrong by more than this factor on a scene that it was fitted on is no candidate:
@@ -45,7 +48,7 @@ HOPELESS = 8.0
 #: Databases of :func:`benchmark`, with size factors that give some hundred primitives.
 DATABASES = {"balls": 2, "gears": 1, "jacks": 2, "lattice": 4, "mount": 4, "rings": 2, "teapot": 5, "tetra": 5, "tree": 7}
 #: Calibrated first: brute force tells what a test costs, which is the same for all.
-FIRST = ("brute", STANDARD, "grid", "octree", "kd-tree")
+FIRST = ("brute", STANDARD, "grid", "light-buffer", "image-directory", "kd-tree", "octree")
 #: Bytes of a triangle in a structure, about: what copies of instances would take.
 TRIANGLE_BYTES = 250
 
@@ -190,6 +193,8 @@ class Model:
     ----------
     build : tuple of 2 float
         log T_B = a + b log n.
+    lazy : tuple of 2 float
+        The same for what is made when the first rays come; for each light, if only shadow rays are served.
     counts : dict
         (kind of ray, "n_it" or "n_ts") -> how it grows, see `_growth`.
     ns : tuple of 3 float
@@ -199,16 +204,19 @@ class Model:
     build: tuple
     counts: dict
     ns: tuple
+    lazy: tuple = (-math.inf, 0.0)
+    lights: bool = False
 
-    def build_seconds(self, n):
-        """Time to build over n primitives."""
-        return math.exp(self.build[0] + self.build[1] * math.log(n + 1.0))
+    def build_seconds(self, n, lights=1):
+        """Time to build over n primitives, for some lights."""
+        eager, lazy = (math.exp(a + b * math.log(n + 1.0)) for a, b in (self.build, self.lazy))
+        return eager + lazy * (lights if self.lights else 1)
 
     def per_ray(self, kind, n, clutter):
         """N_IT, N_TS and seconds of a ray."""
-        n_it, n_ts = (self._count(self.counts.get((kind, c), self.counts["primary", c]), n, clutter) for c in ("n_it", "n_ts"))
+        own = kind if (kind, "n_it") in self.counts else next(iter(self.counts))[0]     # none was there to be measured
+        n_it, n_ts = (self._count(self.counts[own, c], n, clutter) for c in ("n_it", "n_ts"))
         return n_it, n_ts, self.ns[0] + self.ns[1] * n_it + self.ns[2] * n_ts
-
 
     @staticmethod
     def _count(growth, n, clutter):
@@ -232,15 +240,11 @@ def calibration(core="fast"):
     """
     if core not in _known:
         began, cpu, models = time.perf_counter(), time.process_time(), {}
-        scenes = [(_uneven if uneven else _even)(n) for n, uneven in SCENES[core]]
+        scenes = [_lit((_uneven if uneven else _even)(n)) for n, uneven in SCENES[core]]
         sets = [ray_sets(scene, build(scene, STANDARD), RAYS[core][0], 0) for scene in scenes]
         looked = [survey(scene) for scene in scenes]
         # What traces more than rays makes other pictures, and its rays are those of another technique.
-        own = [
-            row.name
-            for row in techniques()
-            if row.family not in ("peers", "generalised") and core in row.cores and set(KINDS) <= set(row.rays)
-        ]
+        own = [row.name for row in techniques() if row.family not in ("peers", "generalised") and core in row.cores]
         for name in sorted(own, key=lambda name: (name not in FIRST, FIRST.index(name) if name in FIRST else 0)):
             if name in FIRST[:2] or time.process_time() - cpu < BUDGET:
                 technique(name).load(core)                              # importing is not building
@@ -261,6 +265,11 @@ def _even(n):
     return Scene.from_triangles(corners.reshape(-1, 3), np.arange(3 * n).reshape(-1, 3))
 
 
+def _lit(scene):
+    """The same with a camera that sees all of it, and a lamp beside."""
+    return Scene(scene.objects, [Light("lamp", "point", (1.0, 1.0, 1.0), (2.0, -3.0, 3.0))], Camera.look_at((3.0, -3.0, 2.0), (0.0, 0.0, 0.0)))
+
+
 def _uneven(n):
     """The same, most of it shrunk into a corner of large triangles."""
     scene = _even(n)
@@ -271,29 +280,42 @@ def _uneven(n):
 
 def _fit(name, core, scenes, looked, sets, brute):
     """The model of one technique, and the largest factor by which it is wrong; `brute` is brute force's, once it is known."""
-    builds, counts, times = [], {}, []
+    builds, lazies, counts, times = [], [], {}, []
+    row = technique(name)
     for scene, batches in zip(scenes, sets):
         start = time.thread_time()
         index = build(scene, name, core)
-        builds.append(math.log(max(time.thread_time() - start, 1e-6)))
+        builds.append(time.thread_time() - start)
+        lazies.append(0.0)
         for batch in batches:
+            if batch.kind not in row.rays:
+                continue
+            if row.family == "directional":                             # lists that are made when the first rays come
+                first, again = (_measured(index, batch.take(slice(0, RAYS[core][1])), RAYS[core][1])[2] for _ in range(2))
+                lazies[-1] += max(first - again, 0.0) * RAYS[core][1]
             *both, seconds = _measured(index, batch, RAYS[core][1])
             counts.setdefault(batch.kind, []).append(both)
             times.append((*both, seconds))
         tree = index.figures.get("depth", 0) > 2
     n = np.log([seen.n + 1.0 for seen in looked])
     clutter = np.log([seen.clutter for seen in looked])
-    slope = float(np.clip((builds[1] - builds[0]) / (n[1] - n[0]), 0.5, 1.3))
+
+    def power(seconds):
+        y = np.log(np.maximum(seconds[:2], 1e-7))
+        slope = float(np.clip((y[1] - y[0]) / (n[1] - n[0]), 0.5, 1.3))
+        return float(y[1] - slope * n[1]), slope
+
     fitted = {(kind, c): _growth(n, clutter, np.array(rows)[:, k] + 1.0, tree) for kind, rows in counts.items() if len(rows) == len(scenes)
               for k, c in enumerate(("n_it", "n_ts"))}
     n_it, n_ts, seconds = np.array(times).T
     if brute is None:
         ray, test = _not_negative(np.stack([np.ones_like(n_it), n_it], axis=1), seconds)
-        return Model((float(builds[1] - slope * n[1]), slope), fitted, (ray, test, 0.0)), 1.0
+        return Model(power(builds), fitted, (ray, test, 0.0)), 1.0
     test = brute.ns[1]
     ray, step = _not_negative(np.stack([np.ones_like(n_ts), n_ts], axis=1) / seconds[:, None], 1.0 - test * n_it / seconds, relative=False)
     ratio = (ray + test * n_it + step * n_ts) / seconds
-    return Model((float(builds[1] - slope * n[1]), slope), fitted, (ray, test, step)), float(np.maximum(ratio, 1.0 / ratio).max())
+    model = Model(power(builds), fitted, (ray, test, step), power(lazies), row.rays == ("shadow",))
+    return model, float(np.maximum(ratio, 1.0 / ratio).max())
 
 
 def _measured(index, batch, fewer):
@@ -306,7 +328,7 @@ def _measured(index, batch, fewer):
         return float(np.mean(counts["n_it"])), float(np.mean(counts["n_ts"])), seconds
 
     n_it, n_ts, less = ask(batch.take(slice(0, fewer)))
-    if n_it * len(batch) > TESTS:
+    if n_it * len(batch) > TESTS or len(batch) <= fewer:
         return n_it, n_ts, less / fewer
     n_it, n_ts, seconds = ask(batch)
     return n_it, n_ts, max((seconds - less) / (len(batch) - fewer), 0.1 * seconds / len(batch))
@@ -357,24 +379,29 @@ def choose(seen, rays, core="fast"):
     choice : dict
         Kind of ray -> name.
     rows : list of dict
-        What each candidate would take: technique, T_B, and per kind N_IT, N_TS and seconds for all rays.
+        What each candidate would take: technique, T_B, and per kind that it serves N_IT, N_TS and seconds for all rays;
+        s: in all, with STANDARD for the other kinds.
     """
     models, _ = calibration(core)
     rows, cost = [], {}
-    for name, model in models.items():
-        row = {"technique": name, "T_B": model.build_seconds(seen.n)}
-        for kind, number in rays.items():
-            n_it, n_ts, seconds = model.per_ray(kind, seen.n, seen.clutter)
-            row |= {f"N_IT {kind}": n_it, f"N_TS {kind}": n_ts, f"s {kind}": seconds * number}
-            cost[name, kind] = seconds * number
-        row["s"] = row["T_B"] + sum(cost[name, kind] for kind in rays)
-        rows.append(row)
+    builds = {name: model.build_seconds(seen.n, len(seen.lights)) for name, model in models.items()}
+    serve = {kind: [name for name in models if kind in technique(name).rays] for kind in rays}
 
     def total(combination):
-        return sum(models[name].build_seconds(seen.n) for name in set(combination)) + sum(cost[n, k] for n, k in zip(combination, rays))
+        return sum(builds[name] for name in set(combination)) + sum(cost[n, k] for n, k in zip(combination, rays))
 
+    for name, model in sorted(models.items(), key=lambda item: item[0] != STANDARD):
+        row = {"technique": name, "T_B": builds[name]}
+        for kind, number in rays.items():
+            if name in serve[kind]:
+                n_it, n_ts, seconds = model.per_ray(kind, seen.n, seen.clutter)
+                row |= {f"N_IT {kind}": n_it, f"N_TS {kind}": n_ts, f"s {kind}": seconds * number}
+                cost[name, kind] = seconds * number
+        if len(row) > 2:
+            row["s"] = total([name if name in serve[kind] else STANDARD for kind in rays])
+            rows.append(row)
     standard = (STANDARD,) * len(rays)
-    best = min(itertools.product(models, repeat=len(rays)), key=total) if rays else ()
+    best = min(itertools.product(*serve.values()), key=total) if rays else ()
     if rays and total(best) > (1.0 - MARGIN) * total(standard):
         best = standard
     return dict(zip(rays, best)), sorted(rows, key=lambda row: row["s"])
@@ -467,29 +494,34 @@ def _left_out(seen, rays, choice, rows, core, primary, depth):
         found.append({"what": what, "why": why, "cost": cost})
 
     def time_of(kind, number):
-        name = next(iter(choice.values()))
-        return f"{models[name].per_ray(kind, seen.n, seen.clutter)[2] * number:.2g} s for {number:,} rays"
+        # By the technique that is there already, if it serves them.
+        name = next((name for name in choice.values() if kind in technique(name).rays), STANDARD)
+        return f"about {models[name].per_ray(kind, seen.n, seen.clutter)[2] * number:.2g} s for {number:,} rays"
 
+    third = max(primary // 3, 1)                                        # as `expected_rays` has it
     if "secondary" not in rays:
         why = "depth is 0" if not depth and (seen.mirrors or seen.glass) else "no material mirrors, refracts or lets light straight through"
-        add("secondary rays", why, time_of("secondary", primary))
+        add("secondary rays", why, f"{time_of('secondary', third)} if a third of what is seen were a mirror, and {_size(core, 'tracing', 'secondary', 'optics')}")
     if not seen.glass:
-        add("refraction", "no material has transmission", "one ray more at each mirror, and its module")
+        add("refraction", "no material has transmission", f"{time_of('secondary', 2 * third)} if a third of what is seen were glass")
     if "shadow" not in rays:
-        add("shadow rays", "no light casts shadows" if seen.dark_lights else "there is no light", time_of("shadow", primary))
+        add("shadow rays", "no light casts shadows" if seen.dark_lights else "there is no light",
+            f"{time_of('shadow', primary)} to a light, and {_size(core, 'tracing', 'lights', 'shadows')}")
     for name in seen.dark_lights:
         add(f"shadow rays to {name}", "it casts no shadows, or is black", time_of("shadow", primary))
     if not seen.textures:
-        add("textures", "no material has one", "looking up a colour at each hit, and their module")
+        add("textures", "no material has one", f"about {_lookup_seconds(core) * primary:.2g} s to look up {primary:,} colours, and {_size(core, 'tracing', 'texture')}")
     solid = [k for k in seen.kinds if k not in ("triangle", "instance")]
     if not solid:
-        add("analytic primitives and Booleans", "there are only triangles", "their modules")
+        add("analytic primitives and Booleans", "there are only triangles", _size(core, "primitives", "solids", *SOLIDS))
     elif "csg" not in solid:
-        add("Boolean combinations", "no solids are combined", "their module")
+        add("Boolean combinations", "no solids are combined", _size(core, "primitives", "csg"))
     if "triangle" not in seen.kinds:
-        add("triangles", "there are only solids", "nothing is built for them")
+        add("triangles", "there are only solids", f"{_size(core, 'primitives', 'triangle')}; nothing is built for them")
     if "instance" not in seen.kinds:
-        add("a second level of structures", "no mesh is shared often enough to be kept once", "a change of space for each ray at each instance")
+        number = sum(rays.values())
+        add("a second level of structures", "no mesh is shared often enough to be kept once",
+            f"about {_change_seconds(core) * number:.2g} s if each of {number:,} rays changed its space once, and {_size(core, 'primitives', 'instance')}")
     else:
         add("copies of shared meshes", f"{seen.kinds['instance']} objects are kept as instances",
             f"{seen.copied:,} triangles, about {seen.copied * TRIANGLE_BYTES / 1e6:,.0f} MB")
@@ -498,11 +530,58 @@ def _left_out(seen, rays, choice, rows, core, primary, depth):
         if row["technique"] not in used:
             add(row["technique"], f"would take longer than {' and '.join(sorted(used))}" if row["s"] > sum(r["s"] for r in rows if r["technique"] in used)
                 / len(used) else "would gain less than the model is sure of", f"{row['T_B']:.2g} s to build, {row['s']:.2g} s in all")
-    skipped = [t.name for t in techniques() if t.name not in models and t.family != "peers"]
-    if skipped:
-        add(", ".join(skipped), "serve only some kinds of ray, trace other things than rays, or were not calibrated within the time for it", "not estimated")
-    add("the passes N_IT and N_TS", "they are counted only with --count", "some time at each test and step")
+    for row in techniques():
+        if row.family == "peers" or row.name in {r["technique"] for r in rows}:
+            continue
+        if row.name in models:
+            add(row.name, f"it serves {' and '.join(row.rays)} rays, and there are none", f"{models[row.name].build_seconds(seen.n):.2g} s to build")
+            continue
+        if row.family == "generalised":
+            why = "it traces other things than rays, and makes other pictures"
+        else:
+            why = "its time does not follow from its counters, or there was no time left to calibrate it"
+        add(row.name, why, f"{_size(core, row.family, row.module)}; time only known by trying: rayscope trace --technique {row.name}")
+    add("the passes N_IT and N_TS", "they are counted only with --count", f"{16 * primary / 1e6:.2g} MB, and adding to them at each test and step")
     return found
+
+
+#: Modules of analytic primitives.
+SOLIDS = ("sphere", "box", "cylinder", "cone", "polygon", "polytope", "pyramid", "csg")
+
+
+def _size(core, family, *modules):
+    """How much source of modules is not read, compiled and kept: in words."""
+    folder = Path(__file__).parents[1] / core / family
+    files = [f for f in (folder / f"{name}.py" for name in modules) if f.is_file()]
+    return f"{sum(f.stat().st_size for f in files) / 1e3:.0f} kB of source in {len(files)} module(s) not imported"
+
+
+def _change_seconds(core):
+    """What it takes to bring a ray into another space: its origin and its direction times a matrix."""
+    if core == "fast":
+        matrix, rays = np.eye(3), np.ones((2, 3, 4000))
+        return _clocked(lambda: matrix @ rays) / 4000
+    matrix, ray = [[1.0, 0.0, 0.0]] * 3, (1.0, 2.0, 3.0)
+    return 2.0 * _clocked(lambda: [sum(a * b for a, b in zip(row, ray)) for row in matrix for _ in range(50)]) / 50
+
+
+def _lookup_seconds(core):
+    """What the four pixels around a texture's point and their weighted mean take, by numbers alone."""
+    if core == "fast":
+        pixels, at, weight = np.ones((4096, 4), np.float32), np.arange(4000) % 4096, np.full((4000, 1), 0.25)
+        return _clocked(lambda: sum(pixels[at] * weight for _ in range(4))) / 4000
+    pixels, point = np.ones((64, 64, 4), np.float32), [0.25] * 4
+    return _clocked(lambda: [sum(w * float(pixels[3, k][c]) for k, w in enumerate(point)) for c in range(4)])
+
+
+def _clocked(work):
+    """Seconds of a piece of work, the least of three."""
+    least = math.inf
+    for _ in range(3):
+        start = time.perf_counter()
+        work()
+        least = min(least, time.perf_counter() - start)
+    return least
 
 
 def _precision(seen):
@@ -546,7 +625,7 @@ def against_fixed(scene, size=(160, 120), core="fast", names=None, repeats=2):
     if names is None:                                                   # those that could be the best
         rows = plan(scene, size, core=core).rows
         standard = next(row["s"] for row in rows if row["technique"] == STANDARD)
-        names = [row["technique"] for row in rows if row["s"] < HOPELESS * standard]
+        names = [row["technique"] for row in rows if row["s"] < HOPELESS * standard and technique(row["technique"]).rays == KINDS]
     choice, seconds = {}, dict.fromkeys((AUTOMATIC, *names), math.inf)
     for _ in range(repeats):                                            # interleaved: a busy moment hits all alike
         for name in seconds:

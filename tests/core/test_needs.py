@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from rayscope.core import Camera, Light, Material, Mesh, Object, Scene, Shapes, solids, trace
+from rayscope.core import catalogue
 from rayscope.core.command import main
 from rayscope.core.lab import needs
 
@@ -66,8 +67,32 @@ def test_choice():
     assert set(choice) == {"primary", "shadow"} and "brute" not in choice.values()
     assert [r["s"] for r in rows] == sorted(r["s"] for r in rows)
     models, _ = needs.calibration()
-    costs = {name: m.build_seconds(seen.n) + sum(m.per_ray(k, seen.n, seen.clutter)[2] for k in choice) * 100_000 for name, m in models.items()}
-    assert rows[0]["technique"] == min(costs, key=costs.get) and rows[0]["s"] == pytest.approx(min(costs.values()))
+    costs = {name: m.build_seconds(seen.n) + sum(m.per_ray(k, seen.n, seen.clutter)[2] for k in choice) * 100_000 for name, m in models.items()
+             if catalogue.technique(name).rays == needs.KINDS}
+    whole = [row for row in rows if row["technique"] in costs]
+    assert whole[0]["technique"] == min(costs, key=costs.get) and whole[0]["s"] == pytest.approx(min(costs.values()))
+
+
+def test_techniques_for_some_kinds_of_ray_are_chosen_for_these(monkeypatch):
+    def model(build, ray, kind="primary", **more):
+        return needs.Model((np.log(build), 0.0), {(kind, c): (0.0, 0.0, 0.0, False) for c in ("n_it", "n_ts")}, (ray, 0.0, 0.0), **more)
+    lit = scene_of(lights=[Light(f"light {k}", "point", (1.0, 1.0, 1.0), (k, 0.0, 5.0)) for k in range(3)])
+    seen = needs.survey(lit)
+    models = {"bvh": model(1.0, 1e-3), "light-buffer": model(1e-9, 1e-5, "shadow", lazy=(np.log(2.0), 0.0), lights=True),
+              "image-directory": model(0.1, 1e-6)}
+    monkeypatch.setitem(needs._known, "fast", (models, 0.0))
+    few, many = {"primary": 10, "shadow": 1000}, {"primary": 100_000, "shadow": 100_000}
+    assert needs.choose(seen, few)[0] == {"primary": "bvh", "shadow": "bvh"}            # three lights' buffers are dearer
+    choice, rows = needs.choose(seen, many)
+    assert choice == {"primary": "image-directory", "shadow": "light-buffer"}
+    row = next(r for r in rows if r["technique"] == "light-buffer")
+    assert row["T_B"] == pytest.approx(6.0) and row["s"] == pytest.approx(6.0 + 1.0 + 100.0 + 1.0) and "s primary" not in row
+    plan = needs.plan(lit, (400, 250))
+    assert plan.choice["shadow"] == "light-buffer" and "light-buffer" in needs.text(plan)
+    free, fixed = (trace(lit, name, size=(16, 12)) for name in ("automatic", "bvh"))
+    assert np.array_equal(free.image, fixed.image)
+    forced = trace(lit, size=(16, 12), primary="image-directory", shadow="light-buffer")
+    assert np.array_equal(forced.image, fixed.image)
 
 
 def test_choice_follows_the_model(monkeypatch):
@@ -97,7 +122,10 @@ def test_plan_says_what_is_left_out():
     plan = needs.plan(scene_of())
     left = {item["what"]: item for item in plan.left_out}
     assert {"secondary rays", "refraction", "shadow rays", "textures", "analytic primitives and Booleans", "a second level of structures"} <= set(left)
-    assert set(plan.choice) == {"primary"} and all(item["why"] and item["cost"] for item in plan.left_out)
+    assert set(plan.choice) == {"primary"} and all(item["why"] for item in plan.left_out)
+    assert all(any(c.isdigit() and c != "0" for c in item["cost"]) for item in plan.left_out)
+    named = {name for item in plan.left_out for name in item["what"].split(", ")} | set(plan.choice.values())
+    assert {t.name for t in catalogue.techniques() if t.family != "peers"} <= named
     other = needs.plan(scene_of((Material("glass", transmission=1.0),), objects=[Object("ball", Shapes([solids.sphere((0, 0, 3), 1.0)]))]))
     assert not {"secondary rays", "refraction", "analytic primitives and Booleans"} & {item["what"] for item in other.left_out}
     assert set(other.choice) == {"primary", "secondary"}
