@@ -9,7 +9,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from .layout import Layout, mirrors, to_world
-from .scene import Mesh
 from .solids import Corners, bounds, place
 
 #: Corners of a face, at most.

@@ -135,6 +135,5 @@ def _first(position, right, up, forward, window, perspective, start, end, kind, 
     scale = window[[0, 1], [0, 1]]
     unwindow = np.diag([1.0 / scale[0], 1.0 / scale[1], 1.0, 1.0])
     unwindow[:2, 3] = -window[:2, 3] / scale
-    return Beams(
-        [window @ project @ view], [unview @ unproject @ unwindow], [start], [end], np.ones((1, 3)), [-1], [-1], [kind], [0], [light]
-    )
+    there, back = window @ project @ view, unview @ unproject @ unwindow
+    return Beams([there], [back], [start], [end], np.ones((1, 3)), [-1], [-1], [kind], [0], [light])

@@ -210,7 +210,8 @@ class BeamTracer(Whitted):
             self._count(PRIMARY, asked, np.count_nonzero(hits.primitive >= 0), {})
             met = np.flatnonzero(hits.primitive >= 0)
             at = self.surfaces.at(hits, met, d[:, met])
-            hits = type(hits)(*(getattr(hits, f)[met] for f in ("t", "primitive", "object", "u", "v", "part", "normal", "point", "error")))
+            names = "t", "primitive", "object", "u", "v", "part", "normal", "point", "error"
+            hits = type(hits)(*(getattr(hits, name)[met] for name in names))
             self._put(out, asked[met], hits, at)
         return out
 
@@ -269,7 +270,8 @@ class BeamTracer(Whitted):
         if len(later):
             own = beam[later]
             above, mirror = tree.beams.parent[own], tree.beams.mirror[own]
-            wave, hits, at = self._as_wave(above, mirror, xy[later], share[later], pixel[later], None if key is None else key[later])
+            keys = None if key is None else key[later]
+            wave, hits, at = self._as_wave(above, mirror, xy[later], share[later], pixel[later], keys)
             for kind in (REFLECTED, REFRACTED, TRANSPARENT):
                 mine = np.flatnonzero(tree.beams.kind[own] == kind)
                 waves += self._going_on(wave, hits, at, mine, (kind,))

@@ -10,7 +10,7 @@ from ...hits import Hits
 from ..tracing.optics import refract
 from ..tracing.secondary import mirrored_and_refracted
 from ..tracing.vectors import dot, unit
-from .beam_clip import areas, boxes, expanded, joined
+from .beam_clip import areas, expanded, joined
 from .beam_space import LIGHT, NOWHERE, REFLECTED, REFRACTED, TRANSPARENT, Beams, eye_beam, light_beams
 from .beam_walk import Fragments, TOLERANCE, Walk, carved, distances, outlines
 

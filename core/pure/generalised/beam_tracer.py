@@ -150,7 +150,8 @@ class BeamTracer(Whitted):
             n = max(math.ceil(SAMPLES * area - 1e-9), 1)
             for i in range(n):
                 key = sampling.first_key(y * self.size[0] + x, i, self.seed)
-                stack += self._rays_for(f, number, _random_point(points, key), area / n, sampling.mix((key + number) & sampling.MASK))
+                own = sampling.mix((key + number) & sampling.MASK)
+                stack += self._rays_for(f, number, _random_point(points, key), area / n, own)
         while stack:
             for path, hit, surface in self._met(stack.pop()):
                 if surface is None:
