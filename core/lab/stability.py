@@ -21,8 +21,9 @@ from ..catalogue import build, technique, techniques
 from ..errors import MemoryEstimateError, MissingPackageError, RayscopeError, SceneError
 from ..scene import layout
 from ..scene.scene import Mesh
-from . import exact, report
+from . import exact, report, stability_pictures
 from .stress import Batch, cases, corners_of, frame
+from .stress_pictures import pictures
 
 EPSILON = 2.0**-52
 #: Part of max(|t|, size of the scene) by which t may be wrong; `t_bound` of the table is in these units.
@@ -239,7 +240,7 @@ def spawned(index, batch, hits, rng, core):
     else:
         from ..pure.tracing.vectors import pushed
         o = np.array([pushed(tuple(hits.point[k]), hits.error[k], tuple(n), tuple(x)) for k, n, x in zip(found, normal.tolist(), d.tolist())])
-    return Batch(o.reshape(-1, 3), d), hits.primitive[found]
+    return Batch(o.reshape(-1, 3), d, leaving=np.stack([hits.object[found], hits.primitive[found]]).astype(np.int64)), hits.primitive[found]
 
 
 def examine(case, scene, batch, right, name, core, seed, base, timed=True):
@@ -320,9 +321,8 @@ def _timed(index, batch, core, base):
 # --- the suite --------------------------------------------------------------------------------------------------------
 
 def contestants(names=None):
-    """Techniques that answer rays of all kinds, with a core each; Embree and mathutils compute in float32 and are left out."""
-    return [(row.name, core) for row in techniques() if row.family != "peers" and {"primary", "secondary", "shadow"} <= set(row.rays)
-            and (names is None or row.name in names) for core in row.cores]
+    """Techniques with a core each; those for some kinds of ray hand over others. Embree and mathutils compute in float32 and are left out."""
+    return [(row.name, core) for row in techniques() if row.family != "peers" and (names is None or row.name in names) for core in row.cores]
 
 
 def takes(name, case):
@@ -351,6 +351,7 @@ def run(full=False, seed=0, names=None, only=None, seconds=None, timed=True, say
     -------
     dict
         rows : one a technique, core and case, with the keys COLUMNS. truth : one a case, with the keys TRUTH_COLUMNS.
+        pictures : one a technique, core and picture, with the keys of `stability_pictures`.
         left_out : list of str. failures : rows whose verdict is not ok. failed : bool. run : seed and full.
 
     Raises
@@ -358,18 +359,25 @@ def run(full=False, seed=0, names=None, only=None, seconds=None, timed=True, say
     RayscopeError
         For an unknown case.
     """
-    everything = cases(full)
-    unknown = set(only or ()) - {c.name for c in everything}
+    everything, drawn = cases(full), pictures(full)
+    names_of_cases = [c.name for c in (*everything, *drawn)]
+    unknown = set(only or ()) - set(names_of_cases)
     if unknown:
-        raise SceneError(f"stability: there is no case {', '.join(sorted(unknown))}. Cases: {', '.join(c.name for c in everything)}.")
+        raise SceneError(f"stability: there is no case {', '.join(sorted(unknown))}. Cases: {', '.join(names_of_cases)}.")
     began, rows, truths, left_out, base = time.monotonic(), [], [], [], {}
-    for k, case in enumerate(everything):
-        if only and case.name not in only and not (timed and case.name == "friendly"):
-            continue
-        if seconds is not None and time.monotonic() - began > seconds:
-            left_out.append(f"{case.name}: there was no time.")
-            continue
-        say(f"{case.name} ({k + 1} of {len(everything)})")
+
+    def to_do(some, friendly, first):
+        """The cases that are asked for, one after the other while there is time; the friendly one always, if times are compared."""
+        for k, case in enumerate(some, first):
+            if only and case.name not in only and not (friendly and case.name == friendly):
+                continue
+            if seconds is not None and time.monotonic() - began > seconds:
+                left_out.append(f"{case.name}: there was no time.")
+                continue
+            say(f"{case.name} ({k} of {len(names_of_cases)})")
+            yield case
+
+    for case in to_do(everything, "friendly" if timed else "", 1):
         scene, batch = scene_and_rays(case, seed, RAYS[full])
         right = asked(batch, built(case, scene, "brute", "pure"))
         truths.append(_truth_row(case, scene, batch, right, full))
@@ -389,8 +397,12 @@ def run(full=False, seed=0, names=None, only=None, seconds=None, timed=True, say
             if case.name == "friendly" and "seconds" in row:
                 base[name, core] = row
             rows.append(row)
-    failures = [r for r in rows + truths if not r["verdict"].startswith(("ok", "refused"))]
-    return {"rows": rows, "truth": truths, "left_out": left_out, "failures": failures, "failed": bool(failures), "seconds": time.monotonic() - began,
+    drawn_rows, known, pace = [], {}, {}
+    with_pictures = not only or any(c.name in only for c in drawn)
+    for case in to_do(drawn if with_pictures else (), drawn[0].name if timed else "", len(everything) + 1):
+        drawn_rows += stability_pictures.examined(case, seed, contestants(names), pace, known)
+    failures = [r for r in rows + truths + drawn_rows if not r["verdict"].startswith(("ok", "refused"))]
+    return {"rows": rows, "truth": truths, "pictures": drawn_rows, "left_out": left_out, "failures": failures, "failed": bool(failures), "seconds": time.monotonic() - began,
             "run": {"seed": seed, "full": full}}
 
 
@@ -424,12 +436,22 @@ def text(result):
     lines = ["Techniques against brute force:", "",
              report.table(sums, ("technique", "core", "cases", "rays", "wrong", "lost", "ghost", "leaks", "self_hits", "t_error", "slowest")), "",
              "Brute force against exact arithmetic:", "", report.table(result["truth"], TRUTH_COLUMNS), "",
+             "Pictures, those that took longest by their work or failed:", "", report.table(_worst(result["pictures"]), stability_pictures.COLUMNS), "",
              "t_error: of t, in 2^-52 max(|t|, size of the scene); 8 are allowed between techniques.",
              "off_surface: distance of the ray's point at t from the primitive, in 2^-52 of the largest coordinate, the ray's origin included.",
              "Both cores test triangles in float64; boxes in float32 (numpy core, hierarchies) are rounded outwards and lose nothing."]
     for row in result["failures"]:
         lines.append(f"FAILED {row['technique']} ({row['core']}) on {row['case']}: {row['verdict']}")
     return "\n".join(lines)
+
+
+def _worst(rows):
+    """Rows of pictures that failed, or that of each case which took longest for its work."""
+    by = {}
+    for row in rows:
+        by.setdefault(row["case"], []).append(row)
+    longest = [max(some, key=lambda r: r.get("slow", 0.0) / max(r.get("work", 1.0), 1.0)) for some in by.values()]
+    return [row for row in rows if row["verdict"] != "ok" or any(row is other for other in longest)]
 
 
 # --- files ------------------------------------------------------------------------------------------------------------
@@ -441,6 +463,8 @@ def failure(row, seed, full):
     -------
     dict
     """
+    if row["case"] in {c.name for c in pictures()}:
+        return {k: row[k] for k in ("case", "technique", "core", "verdict", "bad")} | {"full": full, "seed": seed}
     case = next(c for c in cases(full) if c.name == row["case"])
     scene, batch = scene_and_rays(case, seed, RAYS[full])
     rays = [{"number": r, "o": [x.hex() for x in batch.o[r].tolist()], "d": [x.hex() for x in batch.d[r].tolist()],
@@ -477,6 +501,8 @@ def replay(path, say=lambda line: None):
     """
     try:
         saved = json.loads(Path(path).read_text(encoding="utf-8"))
+        if saved["case"] in {c.name for c in pictures()}:
+            return _replayed_picture(saved)
         case = next(c for c in cases(saved["full"]) if c.name == saved["case"])
         rays = [[[float.fromhex(x) for x in ray[k]] for k in "od"] + [float.fromhex(ray[k]) for k in ("t_min", "t_max")] for ray in saved["rays"]]
     except (ValueError, KeyError, TypeError, StopIteration):
@@ -504,6 +530,17 @@ def replay(path, say=lambda line: None):
     return {"rays": lines, "row": row, "truth": true, "failed": row["verdict"] != "ok" or true["verdict"] != "ok"}
 
 
+def _replayed_picture(saved):
+    """A failing picture again, and the friendly one, whose time it is compared with."""
+    case, friendly = next(c for c in pictures(saved["full"]) if c.name == saved["case"]), pictures()[0]
+    pace, known, pair = {}, {}, [(saved["technique"], saved["core"])]
+    if not technique(saved["technique"]).ray_by_ray:                    # held against the other core's
+        pair = [(saved["technique"], core) for core in technique(saved["technique"]).cores]
+    rows = [row for some in (friendly, case) for row in stability_pictures.examined(some, saved["seed"], pair, pace, known)]
+    row = next(r for r in rows if (r["case"], r["core"]) == (case.name, saved["core"]))
+    return {"rays": [], "row": row, "truth": {"verdict": "ok"}, "failed": row["verdict"] != "ok"}
+
+
 def write(result, folder, say=lambda line: None):
     """Write tables, plots and the failing cases.
 
@@ -515,7 +552,8 @@ def write(result, folder, say=lambda line: None):
     """
     folder, files = report.folder(folder), []
     for name, content in (("table.txt", text(result) + "\n"), ("table.csv", report.to_csv(result["rows"], COLUMNS)),
-                          ("exact.csv", report.to_csv(result["truth"], TRUTH_COLUMNS))):
+                          ("exact.csv", report.to_csv(result["truth"], TRUTH_COLUMNS)),
+                          ("pictures.csv", report.to_csv(result["pictures"], stability_pictures.COLUMNS))):
         (folder / name).write_text(content, encoding="utf-8")
         files.append(folder / name)
     for k, row in enumerate(result["failures"]):

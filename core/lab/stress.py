@@ -6,6 +6,8 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ..scene import solids
+from ..scene.camera import Camera
+from ..scene.light import Light
 from ..scene.scene import Mesh, Object, Scene, Shapes
 
 TRIANGLES = frozenset({"triangle"})
@@ -21,6 +23,8 @@ class Batch:
     t_min, t_max : ndarray, shape (n,)
     must : {"", "hit", "miss"}
         What has to become of every ray; empty where brute force says it.
+    leaving : ndarray, shape (2, n), optional
+        Objects and primitives that the rays leave.
     """
 
     o: np.ndarray
@@ -28,6 +32,7 @@ class Batch:
     t_min: np.ndarray = None
     t_max: np.ndarray = None
     must: str = ""
+    leaving: np.ndarray = None
 
     def __post_init__(self):
         self.o, self.d = (np.array(x, float) for x in np.broadcast_arrays(self.o, self.d))
@@ -40,10 +45,13 @@ class Batch:
 
     def take(self, index):
         """Some of the rays."""
-        return Batch(self.o[index], self.d[index], self.t_min[index], self.t_max[index], self.must)
+        leaving = None if self.leaving is None else self.leaving[:, index]
+        return Batch(self.o[index], self.d[index], self.t_min[index], self.t_max[index], self.must, leaving)
 
     def ask(self, index, **more):
         """The hits that a structure finds."""
+        if self.leaving is not None and index.follows:
+            more["leaving"] = self.leaving
         return index.closest(self.o, self.d, t_min=self.t_min, t_max=self.t_max, **more)
 
 
@@ -223,6 +231,26 @@ def spheres(scale=1.0, offset=0.0):
                                                         for c, r in zip(rng.random((12, 3)), 0.05 + 0.15 * rng.random(12))]))])
 
 
+def tangent_spheres(rng=None):
+    """Four spheres, each of which touches the three others."""
+    return [solids.sphere(c, math.sqrt(2.0)) for c in ((1, 1, 1), (1, -1, -1), (-1, 1, -1), (-1, -1, 1))]
+
+
+def nested_boxes(rng=None):
+    """A box within a box; one face of each lies in the same plane."""
+    return [solids.box((-1, -1, -1), (1, 1, 1)), solids.box((0, -0.5, -0.5), (1, 0.5, 0.5))]
+
+
+def lit(rng):
+    """Lights on the plane of a surface, on an edge and on a vertex of it, inside a closed mesh, and where the camera is."""
+    floor, body = sheet(rng), ball(rng, 6, 0.0)
+    places = [(9.0, 3.5, 0.25), (2.5, 3.0, 0.25), (3.0, 3.0, 0.25), (3.0, 3.0, 1.5), (-2.0, 3.0, 4.0), (0.0, 0.0, 5.0)]
+    lights = [Light(f"light {k}", "point", (10.0, 10.0, 10.0), p) for k, p in enumerate(places)]
+    lights.append(Light("sun along the floor", "sun", (1.0, 1.0, 1.0), direction=(-1.0, 0.0, 0.0)))
+    return Scene([*floor.objects, Object("body", Mesh(body.vertices + (3.0, 3.0, 1.5), body.triangles))], lights,
+                 Camera.look_at(places[4], (3.0, 3.0, 1.0)))
+
+
 def fuzz(rng):
     """Coordinates of random bit patterns, among good triangles."""
     bits = rng.integers(0, 2**64, size=(40, 3, 3), dtype=np.uint64).view(np.float64)
@@ -347,6 +375,61 @@ def starts(scene, rng, n):
     return Batch(np.concatenate([o, tangent.o]), np.concatenate([d, tangent.d]))
 
 
+def cube_rays(scene, rng, n):
+    """Towards corners, edges and borders of cells of a direction cube, from borders of cells of the scene's box."""
+    lo, hi = scene.bounds()
+    centre = 0.5 * (lo + hi)
+    size = float((hi - lo).max())                                       # of the cube around it, whose halves are 5D cells
+    o = centre + 0.5 * size * (rng.integers(-4, 5, (n, 3)) / 4.0)
+    d = rng.integers(-2, 3, (n, 3)) / 2.0
+    d[: n // 3] = np.sign(rng.random((n // 3, 3)) - 0.5)                # |dx| = |dy| = |dz|
+    face = np.arange(n) % 3
+    d[np.arange(n), face] = np.sign(rng.random(n) - 0.5)
+    return Batch(np.concatenate([o, np.broadcast_to(centre, o.shape)]), np.concatenate([d, d]))
+
+
+def in_the_plane(scene, rng, n):
+    """Within the planes of triangles, or as near to them as rounding lets them be."""
+    corners = corners_of(scene)
+    pick = corners[rng.integers(len(corners), size=n)]
+    weight = rng.random((n, 3))
+    on = (pick * (weight / weight.sum(axis=1, keepdims=True))[..., None]).sum(axis=1)
+    across = rng.normal(size=(2, n, 1))
+    d = across[0] * (pick[:, 1] - pick[:, 0]) + across[1] * (pick[:, 2] - pick[:, 0])
+    return Batch(on - 3.0 * d, d)
+
+
+def window_rays(scene, rng, n):
+    """From the camera through the corners of the pixels of its picture, those of the window among them, and from elsewhere."""
+    side = max(int(math.sqrt(n)) - 1, 2)
+    y, x = np.indices((side + 1, side + 1))
+    o, d = scene.camera.rays(x.ravel(), y.ravel(), (side, side))
+    other = mixed_rays(scene, rng, n // 3)
+    return Batch(np.concatenate([o, other.o]), np.concatenate([d, other.d]))
+
+
+def to_lights(scene, rng, n):
+    """From surfaces and from nowhere to the lights, as shadow rays go; a part of them from a light's own plane."""
+    corners = corners_of(scene)
+    pick, weight = corners[rng.integers(len(corners), size=n)], rng.random((n, 3)) + 0.01
+    o = (pick * (weight / weight.sum(axis=1, keepdims=True))[..., None]).sum(axis=1) + (0.0, 0.0, 1e-3)
+    o[::4, 2] = 0.25
+    lights = [scene.lights[k] for k in rng.integers(len(scene.lights), size=n)]
+    d = np.array([np.negative(light.direction) if light.kind == "sun" else np.subtract(light.position, p) for light, p in zip(lights, o)], float)
+    # As far as a trifle before the light: what the light itself lies on does not shade it.
+    return Batch(o, d, t_max=np.where([light.kind == "sun" for light in lights], math.inf, 1.0 - 2.0**-20))
+
+
+def touching(scene, rng, n):
+    """Through the points where spheres touch, and along the lines that they have in common."""
+    points = np.array([(1, 0, 0), (-1, 0, 0), (0, 1, 0), (0, -1, 0), (0, 0, 1), (0, 0, -1)], float)
+    on = points[np.arange(n) % 6]
+    d = rng.normal(size=(n, 3))
+    d[::3] = np.roll(on[::3], 1, axis=1) + np.roll(on[::3], 2, axis=1)  # within the plane that touches both
+    d[1::3] = -on[1::3]
+    return Batch(on - 4.0 * d, d)
+
+
 def fuzzy_rays(scene, rng, n):
     bits = rng.integers(0, 2**64, size=(n, 6), dtype=np.uint64).view(np.float64)
     good = mixed_rays(scene, rng, n)
@@ -408,4 +491,12 @@ def cases(full=False):
         Case("spheres", spheres(), mixed_rays, kinds=frozenset({"sphere"})),
         Case("spheres far away", spheres(1.0, 1e6), mixed_rays, kinds=frozenset({"sphere"})),
         Case("random bits", fuzz, fuzzy_rays, exact=False),
+        Case("seen edge-on", identical(30), in_the_plane),
+        Case("direction cube, blocks", blocks, cube_rays),
+        Case("direction cube, ball", moved_ball(), cube_rays),
+        Case("direction cube, solids", shapes, cube_rays, kinds=frozenset({"sphere", "box", "polygon", "cylinder", "cone"}), exact=False),
+        Case("picture's pixels", lit, window_rays),
+        Case("lights in odd places", lit, to_lights),
+        Case("four tangent spheres", lambda rng: Scene(solids=tangent_spheres()), touching, kinds=frozenset({"sphere"}), exact=False),
+        Case("solids with a face in common", lambda rng: Scene(solids=nested_boxes()), axis_rays, kinds=frozenset({"box"}), exact=False),
     ]
