@@ -22,6 +22,8 @@ class Built:
         Whether Blender's scene has changed since.
     pointed : int
         The cell that is pointed at, -1 for none.
+    beam : core Beam or None
+        The beam that is pointed at, where a structure has beams.
     number : int
         Different for every build.
     ends : dict
@@ -34,6 +36,7 @@ class Built:
     n_objects: int
     stale: bool = False
     pointed: int = -1
+    beam: object = None
     number: int = field(default_factory=lambda: next(_numbers))
     ends: dict = field(default_factory=dict)
 

@@ -97,6 +97,22 @@ def draw_in_view(built, overlay):
         _gpu["boxes"] = Boxes(*overlay_data.boxes(built.cells, **overlay.selection(), pointed=pointed))
         _gpu["signature"] = signature
     _gpu["boxes"].draw(gpu.matrix.get_projection_matrix() @ gpu.matrix.get_model_view_matrix(), overlay.in_front)
+    if built.beam is not None:
+        _draw_beam(built, overlay.in_front)
+
+
+def _draw_beam(built, in_front):
+    """Draw the beam that is pointed at, and the boxes of what its rays may hit."""
+    from gpu_extras.batch import batch_for_shader
+    shader = gpu.shader.from_builtin("UNIFORM_COLOR")
+    if _gpu.get("beam") is not built.beam:
+        lines = overlay_data.beam_lines(built.beam, built.index)
+        _gpu["beam"], _gpu["lines"] = built.beam, batch_for_shader(shader, "LINES", {"pos": lines.reshape(-1, 3)})
+    gpu.state.depth_test_set("NONE" if in_front else "LESS_EQUAL")
+    shader.bind()
+    shader.uniform_float("color", (*overlay_data.POINTED, 1.0))
+    _gpu["lines"].draw(shader)
+    gpu.state.depth_test_set("NONE")
 
 
 def picture(pixels, texels, n, projection):

@@ -12,6 +12,8 @@ SMALLER = 0.06
 COVERED = (1.0, 0.05, 0.01)
 #: Of cells that are pointed at, and those that share their list.
 POINTED = (1.0, 0.35, 0.0)
+#: Candidates of a beam whose boxes are drawn, at most.
+CANDIDATES = 1000
 #: Texels of a cell: two corners of a box, four of a flat cell or of a beam's side, twelve of a piece of a plane; and the colour.
 TEXELS = {"quad": 5, "beam": 5, "polygon": 13}
 
@@ -149,6 +151,31 @@ def boxes(cells, levels=None, leaves_only=False, empty=True, by="LEVEL", opacity
     if len(pointed):
         texels[:n, k - 1][np.isin(index, pointed)] = *POINTED, 1.0
     return texels.reshape(-1, k * CELLS_PER_ROW, 4), n
+
+
+def beam_lines(beam, index):
+    """The frustum of a beam, and the boxes of its candidates.
+
+    Parameters
+    ----------
+    beam : Beam
+    index : core structure
+        That it is from.
+
+    Returns
+    -------
+    ndarray, shape (m, 2, 3), float32
+        Ends of lines: the frustum's twelve, then twelve for each of the first `CANDIDATES` candidates.
+    """
+    items = list(beam.items[:CANDIDATES])
+    primitives = index.primitives
+    if hasattr(primitives, "lo"):
+        lo, hi = primitives.lo[items], primitives.hi[items]
+    else:
+        lo, hi = (np.array([getattr(primitives[i], end) for i in items]).reshape(-1, 3) for end in ("lo", "hi"))
+    corner = np.array([[i >> 1 & 1, i & 1, i >> 2] for i in range(8)])[np.array(beam.EDGES)]
+    boxes = np.where(corner[None] == 1, hi[:, None, None], lo[:, None, None])
+    return np.concatenate([beam.corners()[np.array(beam.EDGES)], boxes.reshape(-1, 2, 3)]).astype(np.float32)
 
 
 def _sides(cells, index):

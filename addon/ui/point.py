@@ -11,7 +11,8 @@ class RAYSCOPE_OT_point(bpy.types.Operator):
     bl_idname = "rayscope.point"
     bl_label = "Point at Cells"
     bl_description = ("Move the pointer over the overlay: the cell under it stands out with those that share its list, and the status bar tells "
-                      "its name, level and primitives. A click keeps it, Esc or the right button ends")
+                      "its name, level and primitives; of a ray classification, the beam that holds the ray under the pointer and what it may hit. "
+                      "A click keeps it, Esc or the right button ends")
 
     @classmethod
     def poll(cls, context):
@@ -37,10 +38,12 @@ class RAYSCOPE_OT_point(bpy.types.Operator):
     def _end(self, context, built, keep):
         from ..show.overlay_data import described
         context.workspace.status_text_set(None)
-        if built is not None and keep and built.pointed >= 0:
+        if built is not None and keep and built.beam is not None:
+            self.report({"INFO"}, told(built.beam))
+        elif built is not None and keep and built.pointed >= 0:
             self.report({"INFO"}, described(built.cells, built.pointed))
         elif built is not None:
-            built.pointed = -1
+            built.pointed, built.beam = -1, None
         redraw.views()
         return {"FINISHED" if keep else "CANCELLED"}
 
@@ -52,13 +55,22 @@ def look(context, built, x, y):
     cell = -1
     if region is not None:
         place = x - region.x, y - region.y
+        ray = region_2d_to_origin_3d(region, space.region_3d, place), region_2d_to_vector_3d(region, space.region_3d, place)
+        if hasattr(built.index, "beam"):
+            built.beam = built.index.beam(*ray)
+            redraw.views()
+            return told(built.beam) if built.beam is not None else ""
         chosen = context.scene.rayscope.overlay.selection()
-        cell = at_pointer(built.cells, region_2d_to_origin_3d(region, space.region_3d, place),
-                          region_2d_to_vector_3d(region, space.region_3d, place), chosen["levels"], chosen["empty"])
+        cell = at_pointer(built.cells, *ray, chosen["levels"], chosen["empty"])
     if cell != built.pointed:
         built.pointed = cell
         redraw.views()
     return described(built.cells, cell) if cell >= 0 else ""
+
+
+def told(beam):
+    """A line about a beam."""
+    return f"Beam along {'-' if beam.sign < 0 else '+'}{'xyz'[beam.axis]}: level {beam.level}, {len(beam.items):,} candidates"
 
 
 def _view_at(context, x, y):

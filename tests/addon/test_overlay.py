@@ -333,3 +333,24 @@ def test_a_sphere_is_drawn_round():
     assert radius.max() < 0.84 and len(x) > 200
     angle = np.arctan2(y - 50, x - 50)[radius > 0.75]
     assert len(np.unique((angle / (2 * np.pi) * 48).round())) >= 46
+
+
+@pytest.mark.parametrize("core", ["pure", "fast"])
+def test_a_beam_and_what_it_may_hit(core):
+    import bl_ext.user_default.rayscope.core as rayscope
+
+    rng = np.random.default_rng(3)
+    corners = (rng.uniform(-1, 1, (60, 1, 3)) + 0.1 * rng.normal(size=(60, 3, 3))).reshape(-1, 3)
+    scene = rayscope.Scene.from_triangles(corners, np.arange(180).reshape(-1, 3))
+    index = rayscope.build(scene, "ray-classification", core, max_depth=6)
+    origin, direction = (0.1, 0.2, 5.0), (0.02, -0.03, -1.0)
+    index.closest([origin] * 50, [direction] * 50)
+    beam = index.beam(origin, direction)
+    lines = overlay_data.beam_lines(beam, index)
+    assert lines.shape == (12 * (1 + len(beam.items)), 2, 3) and np.isfinite(lines).all() and len(beam.items)
+    boxes = corners.reshape(60, 3, 3)[list(beam.items)]
+    found = lines[12:].reshape(len(beam.items), 24, 3)
+    np.testing.assert_allclose(found.min(axis=1), boxes.min(axis=1), rtol=1e-6)
+    np.testing.assert_allclose(found.max(axis=1), boxes.max(axis=1), rtol=1e-6)
+    assert ((lines[12:, 0] != lines[12:, 1]).sum(axis=1) == 1).all(), "an edge of a box runs along one axis"
+    assert overlay_data.beam_lines(beam, index)[:12].min(axis=(0, 1))[2] <= corners[:, 2].min() + 1e-6, "as far as the scene reaches"

@@ -341,5 +341,5 @@ def test_a_reader_that_leaves_early_is_no_error(process):
 def test_every_verb_has_help_and_json():
     parser = command.parser(with_file=True)
     for name, verb in VERBS.items():
-        call = parser.parse_args([name, *(["x.blend"] if verb.scene else []), "--json"])
+        call = parser.parse_args([name, *(["x.blend"] if verb.scene else ["x.py"] if name == "check" else []), "--json"])
         assert call.json and verb.help and verb.run.__doc__

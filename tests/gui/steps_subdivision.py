@@ -59,5 +59,17 @@ def steps():
     window.event_simulate(type="LEFTMOUSE", value="RELEASE", x=540, y=420)
     yield "kept"
     log["kept"] = built.pointed
+    overlay.leaves_only, overlay.first_level, overlay.last_level, overlay.colour_by = False, 200, 255, "LEVEL"  # no boxes of origins
+    build("ray-classification")
+    built = session.built_of(scene)
+    yield "no beam"
+    bpy.ops.rayscope.point("INVOKE_DEFAULT")
+    window.event_simulate(type="MOUSEMOVE", value="NOTHING", x=540, y=420)
+    yield "beam"
+    log["candidates"] = len(built.beam.items)
+    window.event_simulate(type="ESC", value="PRESS", x=540, y=420)
+    window.event_simulate(type="ESC", value="RELEASE", x=540, y=420)
+    yield "beam gone"
+    log["beam"] = built.beam is not None
     folder = Path(sys.argv[sys.argv.index("--") + 2])
     (folder / "log.json").write_text(json.dumps(log))

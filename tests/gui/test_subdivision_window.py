@@ -31,3 +31,5 @@ def test_planes_slabs_regions_lists_and_the_pointer(tmp_path):
     assert found["pointed"]["orange"] > found["lists"]["orange"] + 15, "what is pointed at stands out"
     assert log["pointed"] >= 0 and log["code"] >= 11 and log["count"] > 0
     assert log["beside"] == -1 and log["kept"] == log["pointed"]
+    assert found["beam"]["orange"] > found["no beam"]["orange"] + 100, "the beam under the pointer and its candidates are drawn"
+    assert log["candidates"] > 0 and not log["beam"] and found["beam gone"]["orange"] < found["beam"]["orange"]
