@@ -9,6 +9,7 @@ nanoseconds of each. Both are fitted on small scenes on the machine at hand, onc
 import itertools
 import math
 import time
+from collections import Counter
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -27,8 +28,8 @@ from .rays import ray_sets
 KINDS = ("primary", "secondary", "shadow")
 #: Primitives that are looked at, at most.
 SAMPLE = 2000
-#: Solids whose boxes are looked at, at most, about: one takes as long as a hundred vertices.
-FEW = 100
+#: Solids whose places are looked at, at most, about: one takes as long as a hundred vertices; and a tenth as many boxes.
+FEW = 120
 #: Scenes that the model is fitted on: number of primitives, and whether they are spread unevenly.
 SCENES = {"fast": ((40, False), (700, False), (250, True)), "pure": ((16, False), (150, False), (60, True))}
 #: Rays of each kind: numpy's calls cost the same for few rays as for many, so the seconds of a ray are those by which
@@ -105,9 +106,10 @@ def survey(scene):
     layout = Layout.of(scene.objects)
     objects = scene.objects
     kinds = {"triangle": sum(len(objects[i].geometry) for i in layout.meshes)}
-    for i, k in layout.shapes:
-        kind = objects[i].geometry.solids[k].kind
-        kinds[kind] = kinds.get(kind, 0) + 1
+    for o in objects:
+        if not isinstance(o.geometry, Mesh):
+            for kind, number in Counter(s.kind for s in o.geometry.solids).items():
+                kinds[kind] = kinds.get(kind, 0) + number
     kinds["instance"] = len(layout.instances)
     shared = {id(objects[i].geometry): len(objects[i].geometry) for i in layout.instances}
     copied = sum(len(objects[i].geometry) for i in layout.instances) - sum(shared.values())
@@ -129,8 +131,9 @@ def _place(solid):
     """A point of a solid: its centre, a polygon's first corner; of a combination that of its first part."""
     while hasattr(solid, "left"):
         solid = solid.left
-    corners = solid.values.get("points")
-    return solid.matrix[:3, 3] if corners is None else solid.matrix[:3, :3] @ corners[0] + solid.matrix[:3, 3]
+    corners, m = solid.values.get("points"), solid.matrix.tolist()
+    x, y, z = (0.0, 0.0, 0.0) if corners is None else map(float, corners[0])
+    return [row[0] * x + row[1] * y + row[2] * z + row[3] for row in m[:3]]
 
 
 def _bounds(objects):
@@ -145,8 +148,9 @@ def _bounds(objects):
                 ends = np.fmin.reduce(points), np.fmax.reduce(points)
             else:
                 from ..scene.solids import bounds
-                boxes = [bounds(s) for s in o.geometry.solids[:: 1 + len(o.geometry) // FEW]]
-                ends = np.min([b[0] for b in boxes], axis=0), np.max([b[1] for b in boxes], axis=0)
+                some = o.geometry.solids[:: 1 + len(o.geometry) // FEW]
+                points = np.array([_place(s) for s in some] + [end for s in some[:: 1 + 10 * len(some) // FEW] for end in bounds(s)])
+                ends = points.min(axis=0), points.max(axis=0)
             known[id(o.geometry)] = np.array([[ends[i >> k & 1][k] for k in range(3)] for i in range(8)])
         corners = to_world(o.matrix, known[id(o.geometry)])
         corners = corners[np.isfinite(corners).all(axis=1)]
@@ -162,7 +166,8 @@ def _clutter(scene, n, lo, hi):
     if counts.sum() < 2:
         return 1.0
     # Evenly spaced primitives of all, object by object: no random numbers, so that the same scene gives the same answer.
-    at = np.linspace(0, counts.sum() - 1, min(SAMPLE, int(counts.sum()))).astype(int)
+    solid = sum(not isinstance(o.geometry, Mesh) for o in filled) > len(filled) // 2
+    at = np.linspace(0, counts.sum() - 1, min(FEW if solid else SAMPLE, int(counts.sum()))).astype(int)
     ends = np.cumsum(counts)
     which = np.searchsorted(ends, at, side="right")
     points = []
