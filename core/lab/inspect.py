@@ -21,6 +21,8 @@ from . import report
 
 #: Longer side of the picture that is traced.
 SIDE = 96
+#: A picture that would take more tests and steps than this is traced smaller, a quarter as wide at least.
+MOST_WORK = 20_000_000
 #: Findings whose remedy is tried out, at most.
 CHECKED = 6
 #: A remedy that saves less than this share of the work is no finding, unless it saves memory.
@@ -102,7 +104,7 @@ class Ledger:
 
         def booked(ray, item):
             pairs.append((np.asarray(ray, np.int64), np.asarray(item, np.int64)))
-            test(ray, item)
+            return test(ray, item)
 
         query.test = booked
         before = query.counts.n_ts.copy() if query.counts else None
@@ -247,7 +249,27 @@ def made_real(scene, ledger, corners, **_):
             names = [scene.objects[some[0]].name for some in meshes.values()]
             yield Finding(names, "copies", f"{len(meshes)} meshes of {triangles:,} triangles are the same shape, stored {len(meshes)} times",
                           "Select them, the original last, and link their data: Object > Link/Transfer Data > Link Object Data.", len(meshes),
-                          memory=(len(meshes) - 1) * triangles * TRIANGLE_BYTES)
+                          memory=(len(meshes) - 1) * triangles * TRIANGLE_BYTES, apply=linked([k for some in meshes.values() for k in some]))
+
+
+def linked(numbers):
+    """A remedy: objects of the same shape share the first one's mesh, turned, mirrored and scaled to where they are."""
+    def apply(scene):
+        objects, mesh = list(scene.objects), scene.objects[numbers[0]].geometry
+        own = np.asarray(mesh.vertices, float)
+        middle = own.mean(axis=0)
+        for k in numbers[1:]:
+            o = objects[k]
+            world = to_world(o.matrix, o.geometry.vertices)
+            # Procrustes: the turn that takes one cloud of points onto the other (Schoenemann 1966).
+            u, stretch, v = np.linalg.svd((world - world.mean(axis=0)).T @ (own - middle))
+            matrix = np.eye(4)
+            matrix[:3, :3] = stretch.sum() / (((own - middle) ** 2).sum() or 1.0) * (u @ v)
+            matrix[:3, 3] = world.mean(axis=0) - matrix[:3, :3] @ middle
+            if np.abs(to_world(matrix, own) - world).max() <= 1e-3 * np.ptp(world, axis=0).max():
+                objects[k] = replace(o, geometry=mesh, matrix=matrix)
+        return replace(scene, objects=objects, notices=[])
+    return apply
 
 
 def slivers(scene, ledger, corners, tests, **_):
@@ -366,7 +388,25 @@ def overlapping(scene, ledger, corners, total, **_):
                       f"{wasted[1]:.0%} of the tests on them hit something else or nothing" + (f"; {scene.objects[inner].name} is never seen" if hidden else ""),
                       "Move them apart, or delete the faces that lie inside the other (Boolean modifier, Union)." if not hidden else
                       f"Disable {scene.objects[inner].name} in renders: it lies hidden inside the other.", float(common.prod() / smaller),
-                      apply=without(int(inner)) if hidden else None)
+                      apply=without(int(inner)) if hidden else united(int(a), int(b), corners))
+
+
+def united(a, b, corners):
+    """A remedy: of two objects the triangles are left out whose middle lies inside the other."""
+    def apply(scene):
+        kept = {k: corners[k][~_inside(scene, corners[k].mean(axis=1), other)] for k, other in ((a, b), (b, a))}
+        for k, own in kept.items():
+            scene = with_mesh(k, own)(scene) if len(own) else scene
+        return without(*(k for k, own in kept.items() if not len(own)))(scene)
+    return apply
+
+
+def _inside(scene, points, number):
+    """Which points lie inside an object: what they see of it first, towards a side, is its back."""
+    index = build(Scene([scene.objects[number]]))
+    d = np.broadcast_to((0.36, 0.48, 0.8), points.shape)                # along no axis
+    hits = index.closest(points, d)
+    return hits.hit & ((hits.normal * d).sum(axis=1) > 0.0)
 
 
 CAUSES = (unreached, duplicates, made_real, slivers, diagonals, sub_pixel, teapot_in_a_stadium, overlapping)
@@ -410,8 +450,18 @@ def inspect(scene, technique="bvh", size=(640, 480), depth=5, checked=CHECKED, p
     def part(k, n):
         return None if progress is None else lambda fraction: progress((k + fraction) / n)
 
-    ledger, result = measure(scene, technique, depth=depth, progress=part(0, checked + 1), parameters=parameters)
-    _stop_if_cancelled(result)
+    def measured(scene, technique, pixels, k, parameters):
+        ledger, result = measure(scene, technique, pixels, depth, part(k, checked + 2), parameters)
+        _stop_if_cancelled(result)
+        return ledger, result
+
+    side = SIDE // 4
+    ledger, result = measured(scene, technique, picture_size(scene, side), 0, parameters)
+    # As large as may be: from a quarter of the side the work is known well enough.
+    larger = min(SIDE, int(side * math.sqrt(MOST_WORK / max(work_of(result), 1))))
+    pixels = picture_size(scene, max(side, larger))
+    if larger > side:
+        ledger, result = measured(scene, technique, pixels, 1, parameters)
     corners = own_corners(scene)
     total, work = float(ledger.tests.sum()), work_of(result)
     tests = [ledger.of_primitive[ledger.object_of == k] for k in range(len(scene.objects))]
@@ -428,8 +478,7 @@ def inspect(scene, technique="bvh", size=(640, 480), depth=5, checked=CHECKED, p
         changed = finding.apply(scene)
         changed, other = changed if isinstance(changed, tuple) else (changed, technique)
         if changed.n_primitives:
-            _, again = measure(changed, other, depth=depth, progress=part(k + 1, checked + 1), parameters=parameters if other == technique else None)
-            _stop_if_cancelled(again)
+            _, again = measured(changed, other, pixels, k + 2, parameters if other == technique else None)
             finding.gain = 1.0 - work_of(again) / max(work, 1)
     # What was tried and gains nothing is no finding.
     findings = [f for f in findings if f.gain is None or f.gain >= LEAST_GAIN or f.memory]

@@ -85,6 +85,36 @@ def test_sub_pixel_tiny_and_overlapping():
     assert overlap and overlap[0].gain > 0.05 and "inner" in overlap[0].remedy
 
 
+def test_remedies_of_copies_and_of_overlaps():
+    same, turn = ball(8), np.linalg.qr(np.random.default_rng(1).normal(size=(3, 3)))[0]
+    moved = Mesh(1.5 * same.vertices @ turn + (2.5, 0, 0), same.triangles)
+    mirrored = Mesh(same.vertices * (-1.0, 1.0, 1.0) + (-2.5, 0, 0), same.triangles)
+    scene = seen([placed("one", same), Object("moved", moved), Object("mirrored", mirrored)])
+    linked = inspecting.linked([0, 1, 2])(scene)
+    assert len({id(o.geometry) for o in linked.objects}) == 1
+    for before, after in zip(scene.objects, linked.objects):
+        assert np.allclose(*(inspecting.world_corners(o) for o in (before, after)), atol=1e-9)
+    copies = [f for f in inspecting.inspect(scene).findings if f.cause == "copies"]
+    assert copies and copies[0].gain == pytest.approx(0.0, abs=0.05)      # they save memory
+    pair = seen([placed("left", ball(16, 1), (-0.35, 0, 0)), placed("right", ball(16, 2), (0.35, 0, 0))])
+    corners = inspecting.own_corners(pair)
+    joined = inspecting.united(0, 1, corners)(pair)
+    assert 0.5 < joined.n_primitives / pair.n_primitives < 0.9
+    pictures = [trace(s, size=(24, 24)).passes["depth"] for s in (pair, joined)]
+    assert (pictures[0] == pictures[1]).mean() > 0.98                   # what was inside is not missed
+    overlap = [f for f in inspecting.inspect(pair).findings if f.cause == "overlap"]
+    assert all(f.gain is not None for f in overlap)
+
+
+def test_a_costly_picture_is_traced_smaller(monkeypatch):
+    scene = seen([placed("one", ball())])
+    usual = inspecting.inspect(scene)
+    monkeypatch.setattr(inspecting, "MOST_WORK", usual.work // 4)
+    smaller = inspecting.inspect(scene)
+    assert 0.1 * usual.rays < smaller.rays < 0.5 * usual.rays and smaller.work < usual.work // 3
+    assert smaller.rows[0]["object"] == "one"
+
+
 def test_a_remedy_keeps_the_picture():
     scene = seen([placed("one", ball())])
     corners = inspecting.world_corners(scene.objects[0])
