@@ -7,6 +7,10 @@ from . import redraw
 from .. import session
 
 
+#: Rays sent through the pointer, so that the beam that holds it is divided as far as those of a picture.
+RAYS = 8
+
+
 class RAYSCOPE_OT_point(bpy.types.Operator):
     bl_idname = "rayscope.point"
     bl_label = "Point at Cells"
@@ -57,6 +61,7 @@ def look(context, built, x, y):
         place = x - region.x, y - region.y
         ray = region_2d_to_origin_3d(region, space.region_3d, place), region_2d_to_vector_3d(region, space.region_3d, place)
         if hasattr(built.index, "beam"):
+            built.index.closest(*([end] * RAYS for end in ray))   # cells are made as rays come
             built.beam = built.index.beam(*ray)
             redraw.views()
             return told(built.beam) if built.beam is not None else ""

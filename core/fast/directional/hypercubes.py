@@ -7,7 +7,7 @@ lists are alike shares one, and so does a part whose list is the same as that of
 
 import numpy as np
 
-from ...beam import Beam, box_of
+from ...classification import Beam, box_of
 from ...hits import Cells
 from .beam import B, C, FRAME, M, ROUNDING, U, V, Beams
 

@@ -8,8 +8,8 @@ lists are alike shares one, and so does a part whose list is the same as that of
 import math
 import sys
 
-from ...beam import Beam as Shown
-from ...beam import box_of
+from ...classification import Beam as Shown
+from ...classification import box_of
 from ...hits import Cells
 from .beam import B, C, FRAME, M, ROUNDING, U, V, Beam
 
