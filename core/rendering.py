@@ -10,7 +10,8 @@ from importlib import import_module
 
 import numpy as np
 
-from .catalogue import CORES, build, technique as technique_row
+from .catalogue import ALL_RAYS, CORES, build, technique as technique_row
+from .enclosed import enclosed
 from .errors import Cancelled, MemoryEstimateError, Notice, ParameterError, SceneError
 from .figures import PER_RAY, ray_figures
 from .memory import free_memory
@@ -261,6 +262,10 @@ class Rendering:
         passes = _framebuffer(self.size, names)
         self.result = Result(passes["combined"], passes, notices=_notices(scene))
         self._build(wanted, index)
+        # A structure for all kinds of ray has nothing to build for a question like this.
+        serves_all = [s for s in self.result.structures.values() if s.technique.rays == ALL_RAYS]
+        if "shadow" in self.result.structures:
+            self.result.notices += enclosed((serves_all or [self.result.structures["shadow"]])[0], scene)
         row = self.result.structures["primary"].technique
         tracer = row.load_tracer(core)
         if tracer.antialiases and (self.samples > 1 or antialiasing != "uniform"):

@@ -500,3 +500,21 @@ def test_a_lamp_in_the_plane_of_the_ceiling_shines(core, glassy):
             Scene([floor(LAMBERT), *extra], [lamp], camera, DARK), "brute", core, size=(12, 12), samples=2
         ).image[..., 0]
         np.testing.assert_allclose(lit, without, rtol=1e-6)
+
+
+@pytest.mark.parametrize("core", ["pure", "fast"])
+@pytest.mark.parametrize("shadow", ["bvh", "light-buffer"])
+def test_a_light_inside_something_is_named(core, shadow):
+    corners = np.array([[x, y, z] for x in (-1.0, 1.0) for y in (-1.0, 1.0) for z in (-1.0, 1.0)])
+    quads = np.array([[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]])
+    box = Mesh(corners, np.concatenate([quads[:, :3], quads[:, [0, 2, 3]]]))
+    room, block = np.diag([9.0, 9.0, 9.0, 1.0]), np.eye(4)
+    block[:3, 3] = 2.0
+    objects = [Object("Room", box, matrix=room), Object("Block", box, matrix=block)]
+    lights = [Light(name, "point", (9.0,) * 3, position=place) for name, place in
+              (("Lamp", (-3.0, 0.0, 0.0)), ("Hidden", (2.0, 2.3, 1.8)), ("Outside", (20.0, 0.0, 0.0)))]
+    scene = Scene(objects, lights, Camera.look_at((-4.0, -4.0, 3.0), (0.0, 0.0, 0.0)))
+    notices = trace(scene, core=core, size=(4, 3), shadow=shadow).notices
+    assert [n.name for n in notices if "stands inside" in n.text] == ["Hidden"] and "inside Block" in str(notices[0])
+    outside = Scene(objects, lights, Camera.look_at((-30.0, -4.0, 3.0), (0.0, 0.0, 0.0)))
+    assert [n.name for n in trace(outside, core=core, size=(4, 3), shadow=shadow).notices] == ["Lamp", "Hidden"]
