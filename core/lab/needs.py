@@ -545,7 +545,7 @@ def _left_out(seen, rays, choice, rows, core, primary, depth):
             why = "it traces other things than rays, and makes other pictures"
         else:
             why = "its time does not follow from its counters, or there was no time left to calibrate it"
-        add(row.name, why, f"{_size(core, row.family, row.module)}; time only known by trying: rayscope trace --technique {row.name}")
+        add(row.name, why, f"{_size(core, row.family, row.module, row.tracer.split('.')[1])}; time only known by trying: rayscope trace --technique {row.name}")
     add("the passes N_IT and N_TS", "they are counted only with --count", f"{16 * primary / 1e6:.2g} MB, and adding to them at each test and step")
     return found
 
