@@ -42,8 +42,8 @@ TESTS = 90_000
 TRUST = 3.0
 #: Seconds of processor time after which no further technique is calibrated; those left are no candidates.
 BUDGET = 0.65
-#: Another technique must be faster than the standard one by this part, as the model is not exact.
-MARGIN = 0.25
+#: The whole picture must be faster than with the standard technique by this part, as the model is not exact.
+MARGIN = 0.2
 #: Techniques estimated to take this many times as long as it are not traced to compare.
 HOPELESS = 8.0
 #: Databases of :func:`benchmark`, with size factors that give some hundred primitives.
@@ -171,7 +171,7 @@ def _clutter(scene, n, lo, hi):
     ends = np.cumsum(counts)
     which = np.searchsorted(ends, at, side="right")
     points = []
-    for i in np.unique(which):
+    for i in which[np.diff(which, prepend=-1) > 0]:
         own, o = at[which == i] - (ends[i] - counts[i]), filled[i]
         if isinstance(o.geometry, Mesh):
             points.append(to_world(o.matrix, o.geometry.vertices[o.geometry.triangles[own, 0]]))
@@ -183,7 +183,9 @@ def _clutter(scene, n, lo, hi):
     cells = max(1, int((4.0 * n) ** (1.0 / 3.0)))
     with np.errstate(all="ignore"):
         index = np.clip(np.nan_to_num((points - lo) / extent * cells), 0, cells - 1).astype(np.int64)
-    _, each = np.unique(index @ np.array([cells * cells, cells, 1]), return_counts=True)
+    # Not np.unique: the first call of that imports numpy.ma, which takes longer than all the rest.
+    sorted_ = np.sort(index @ np.array([cells * cells, cells, 1]))
+    each = np.diff(np.flatnonzero(np.diff(sorted_)) + 1, prepend=0, append=len(sorted_))
     m = len(points)
     return max(1.0, n * float((each * (each - 1)).sum()) / max(m * (m - 1), 1))
 
@@ -204,6 +206,8 @@ class Model:
         (kind of ray, "n_it" or "n_ts") -> how it grows, see `_growth`.
     ns : tuple of 3 float
         Seconds of a ray, of a test, of a step.
+    shading : float
+        Seconds for each ray that a picture takes besides, whatever the technique; known of STANDARD.
     """
 
     build: tuple
@@ -211,6 +215,7 @@ class Model:
     ns: tuple
     lazy: tuple = (-math.inf, 0.0)
     lights: bool = False
+    shading: float = 0.0
 
     def build_seconds(self, n, lights=1):
         """Time to build over n primitives, for some lights."""
@@ -256,8 +261,23 @@ def calibration(core="fast"):
                 model, off = _fit(name, core, scenes, looked, sets, models.get(FIRST[0]))
                 if off <= TRUST or name in FIRST[:2]:
                     models[name] = model
+        models[STANDARD].shading = _shading(scenes[1], models[STANDARD], looked[1], core)
         _known[core] = models, time.perf_counter() - began
     return _known[core]
+
+
+def _shading(scene, model, seen, core):
+    """What a picture takes for each of its rays besides their answers: seconds."""
+    from ..rendering import Rendering
+    side = 40 if core == "fast" else 5
+    rendering = Rendering(scene, STANDARD, core, (side, side))
+    start = time.thread_time()
+    for _ in rendering.tiles():
+        pass
+    seconds = time.thread_time() - start
+    rays = {kind: row["rays"] for kind, row in rendering.result.figures.items() if kind in KINDS}
+    answers = sum(model.per_ray(kind, seen.n, seen.clutter)[2] * number for kind, number in rays.items())
+    return max(seconds - answers, 0.0) / max(sum(rays.values()), 1)
 
 
 def _even(n):
@@ -407,7 +427,8 @@ def choose(seen, rays, core="fast"):
             rows.append(row)
     standard = (STANDARD,) * len(rays)
     best = min(itertools.product(*serve.values()), key=total) if rays else ()
-    if rays and total(best) > (1.0 - MARGIN) * total(standard):
+    besides = models[STANDARD].shading * sum(rays.values())             # which no choice saves
+    if rays and total(best) + besides > (1.0 - MARGIN) * (total(standard) + besides):
         best = standard
     return dict(zip(rays, best)), sorted(rows, key=lambda row: row["s"])
 

@@ -103,6 +103,9 @@ def test_choice_follows_the_model(monkeypatch):
     assert needs.choose(seen, {"primary": 10})[0] == {"primary": "grid"}                # the build counts
     assert needs.choose(seen, {"primary": 10**6})[0] == {"primary": "kd-tree"}          # the rays count
     assert needs.choose(seen, {"primary": 10**6, "shadow": 10})[0] == {"primary": "kd-tree", "shadow": "kd-tree"}   # it is built anyway
+    dear = needs.Model(*(getattr(model(1.0, 1e-3), f) for f in ("build", "counts", "ns")), shading=1.0)
+    monkeypatch.setitem(needs._known, "fast", ({"bvh": dear, "grid": model(0.1, 1e-5)}, 0.0))
+    assert needs.choose(seen, {"primary": 10**6})[0] == {"primary": "bvh"}              # a gain lost in what shading takes
     monkeypatch.setitem(needs._known, "fast", ({"bvh": model(1.0, 1e-3), "grid": model(1.0, 0.9e-3)}, 0.0))
     assert needs.choose(seen, {"primary": 10**6})[0] == {"primary": "bvh"}              # a gain smaller than the model's error
 
@@ -205,6 +208,12 @@ def test_import_is_quick(said):
     code = "import numpy, time; t = time.process_time(); import rayscope.core; print(time.process_time() - t)"
     times = [float(said(code)) for _ in range(3)]
     assert min(times) < 0.1
+
+
+def test_looking_imports_nothing(said):
+    code = SCENE + ("from rayscope.core.lab import needs\nscene = Scene([Object('mesh', mesh), Object('ball', Shapes([solids.sphere((0, 0, 0), 1.0)] * 3))])\n"
+                    "import rayscope.core.scene.solids\nbefore = set(sys.modules)\nneeds.survey(scene)\nprint(*set(sys.modules) - before)")
+    assert not said(code).split()
 
 
 def test_survey_of_solids():
