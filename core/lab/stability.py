@@ -130,7 +130,8 @@ def truth(case, scene, batch, hits):
         length = float(lengths(batch.d[r:r + 1])[0])
         failed = False
         if not hit:
-            failed = right is not None and _sure(o, d, right, lists, balls, slack)
+            within = batch.t_min[r], batch.t_max[r]
+            failed = right is not None and _sure(o, d, right, lists, balls, slack, within)
             row["lost"] += failed
         else:
             t = float(hits.t[r])
@@ -176,9 +177,14 @@ def _nearest_ball(o, d, balls):
     return t, [k for other, k in found if other == t]
 
 
-def _sure(o, d, right, lists, balls, slack):
-    """Whether an exact hit lies further than `slack` from the primitive's outline, for one primitive of those tied at least."""
+def _sure(o, d, right, lists, balls, slack, within=(-math.inf, math.inf)):
+    """Whether an exact hit lies further than `slack` from the primitive's outline, for one primitive of those tied at least.
+
+    And from the ends of the ray, `within`: which side of a surface a ray begins on that begins on it, nobody can say.
+    """
     t, numbers = right
+    if min(float(t) - within[0], within[1] - float(t)) * max(map(abs, d)) <= slack:
+        return False
     at = [float(x + t * y) for x, y in zip(exact.fractions(o), exact.fractions(d))]
     for k in numbers:
         if balls:
