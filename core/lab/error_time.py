@@ -29,6 +29,8 @@ MOST, FEWEST = 1024, 2
 FEWEST_POINTS = 4
 #: Timed runs of each setting.
 REPEATS = 3
+#: A setting that takes so many times what was reckoned is given up.
+OVERTIME = 8.0
 #: What ends the paths in all pictures that are not about that, without a bias, and the depths that are tried.
 UNBIASED = {"threshold": 0.003, "roulette": True}
 DEPTHS = (8, 16, 32, 64, 128, 256)
@@ -56,6 +58,8 @@ class Setting:
         Of all kinds; intersection tests ray x primitive.
     error : dict
         See :func:`~.picture_error.errors`.
+    given_up : float
+        Seconds after which it was given up; 0 if it was not.
     verdict : str
     """
 
@@ -69,6 +73,7 @@ class Setting:
     rays: int = 0
     tests: int = 0
     error: dict = field(default_factory=dict)
+    given_up: float = 0.0
     verdict: str = ""
 
     def row(self):
@@ -128,6 +133,10 @@ def error_time(scene, size=(96, 72), seconds=120.0, seed=0, technique="bvh", pro
     return sweep.run()
 
 
+class _TooLong(Exception):
+    """A setting takes far longer than there is time for."""
+
+
 class _Sweep:
     """The run of :func:`error_time`."""
 
@@ -164,7 +173,7 @@ class _Sweep:
         floor = 0.5 * math.sqrt(np.mean((displayed(images[0]) - displayed(images[1])) ** 2))
         stopped = False
         try:
-            self._measure(settings, work, reference)
+            self._measure(settings, work, reference, cost)
             if self.progress:
                 self.progress(1.0)
         except Cancelled:
@@ -173,6 +182,8 @@ class _Sweep:
         settings = [s for s in settings if s.times]
         for s in missing:
             why = "stopped before" if stopped else "no time was left"
+            if s.given_up:
+                why = f"given up after {s.given_up:.3g} s; give more --seconds, or a smaller --size"
             left_out.append(f"{s.curve}, {s.label}: {why}.")
         words = _judged(settings, floor)
         return {
@@ -207,10 +218,16 @@ class _Sweep:
         self._traced({**self.full, "samples": 1}, self.seed, work=0)  # what is imported or built at first use
         return max(self._traced({**self.full, "samples": 2}, self.seed, work=0).figures["T_R"] / 2.0, 1e-4)
 
-    def _traced(self, options, seed, scene=0, count=False, work=0.0, technique=""):
-        """A picture; raises Cancelled when stopped."""
+    def _traced(self, options, seed, scene=0, count=False, work=0.0, technique="", seconds=math.inf):
+        """A picture; raises Cancelled when stopped, _TooLong after some seconds."""
+        end = time.perf_counter() + seconds
+
+        def late():
+            return time.perf_counter() > end
 
         def progress(fraction):
+            if late():
+                raise Cancelled("It takes too long.")
             if self.progress:
                 self.progress(min(1.0, (self.done + fraction * work) / self.total))
 
@@ -224,7 +241,7 @@ class _Sweep:
             **options,
         )
         if result.cancelled:
-            raise Cancelled("stopped.")
+            raise _TooLong if late() else Cancelled("stopped.")
         self.done += work
         return result
 
@@ -336,7 +353,7 @@ class _Sweep:
             return 1.0 + 0.5 * 4 ** o["aa_level"]
         return o["samples"] * (1.0 + 0.5 * (o.get("light_samples", 1) - 1))
 
-    def _measure(self, settings, work, reference):
+    def _measure(self, settings, work, reference, cost):
         """Trace all settings: once to count, then turn by turn for the times, as often as there is time."""
         order = sorted(range(len(settings)), key=lambda i: work[i])
         spent = {}
@@ -353,14 +370,20 @@ class _Sweep:
                     self.done += work[i] * (1.5 if turn == 0 else 1.0)
                     continue
                 start = time.perf_counter()
-                result = self._traced(
-                    setting.options,
-                    self.seed,
-                    setting.scene,
-                    turn == 0,
-                    work[i] * (1.5 if turn == 0 else 1.0),
-                    setting.technique,
-                )
+                try:
+                    result = self._traced(
+                        setting.options,
+                        self.seed,
+                        setting.scene,
+                        turn == 0,
+                        work[i] * (1.5 if turn == 0 else 1.0),
+                        setting.technique,
+                        # What is sampled takes about as long as was reckoned; other ways may take any time.
+                        max(OVERTIME * cost * work[i], 0.25 * self.seconds, 1.0),
+                    )
+                except _TooLong:
+                    setting.given_up = time.perf_counter() - start
+                    continue
                 spent[i] = time.perf_counter() - start
                 if turn == 0:
                     kinds = [f for f in result.figures.values() if isinstance(f, dict)]

@@ -261,3 +261,33 @@ def test_paths_are_followed_until_nothing_changes(share, least):
     sweep = lab._Sweep(scene, (6, 4), 1.0, 0, "bvh", None, print)
     assert sweep.full["depth"] >= least and share ** sweep.full["depth"] < 0.05 or share == 0.0 == sweep.full["depth"]
     assert sweep.full["depth"] <= 8 * least
+
+
+def test_a_setting_without_end_is_given_up(monkeypatch):
+    from rayscope.core.lab import error_time as module
+
+    real = module.trace
+
+    def slow(scene, **options):
+        if options.get("samples") == 2 and options.get("count"):
+            while True:
+                options["progress"](0.5)
+        return real(scene, **options)
+
+    scene = room()
+    result = module.error_time(scene, size=(8, 6), seconds=4.0)
+    assert not any("given up" in line for line in result["left_out"])
+
+    class Stopped:
+        cancelled, figures = True, {}
+
+    def stopping(scene, **options):
+        try:
+            return slow(scene, **options)
+        except module.Cancelled:
+            return Stopped
+
+    monkeypatch.setattr(module, "trace", stopping)
+    result = module.error_time(scene, size=(8, 6), seconds=4.0)
+    assert not result["stopped"] and result["rows"]
+    assert any("2 samples: given up after" in line and "--seconds" in line for line in result["left_out"])
