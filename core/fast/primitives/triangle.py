@@ -149,7 +149,7 @@ class Triangles:
 
     def _collinear(self, item):
         """Whether triangles have no area; found out exactly, once for each."""
-        for k in np.unique(item[self._area.take(item) == 0]):
+        for k in set(item[self._area.take(item) == 0].tolist()):
             self._area[k] = -1 if collinear(*self.xyz[:, k].reshape(3, 3).tolist()) else 1
         return self._area.take(item) < 0
 
