@@ -46,6 +46,8 @@ BUDGET = 0.65
 MARGIN = 0.2
 #: Techniques estimated to take this many times as long as it are not traced to compare.
 HOPELESS = 8.0
+#: Pictures are repeated to compare them until all took so long together, seconds.
+QUICK = 3.0
 #: Databases of :func:`benchmark`, with size factors that give some hundred primitives.
 DATABASES = {"balls": 2, "gears": 1, "jacks": 2, "lattice": 4, "mount": 4, "rings": 2, "teapot": 5, "tetra": 5, "tree": 7}
 #: Calibrated first: brute force tells what a test costs, which is the same for all.
@@ -639,7 +641,7 @@ def text(result):
 # --- was it right? ----------------------------------------------------------------------------------------------------
 
 def against_fixed(scene, size=(160, 120), core="fast", names=None, repeats=2):
-    """Trace a scene with the automatic choice and with each fixed one.
+    """Trace a scene with the automatic choice and with each fixed one, `repeats` times at least.
 
     Returns
     -------
@@ -653,7 +655,10 @@ def against_fixed(scene, size=(160, 120), core="fast", names=None, repeats=2):
         standard = next(row["s"] for row in rows if row["technique"] == STANDARD)
         names = [row["technique"] for row in rows if row["s"] < HOPELESS * standard and technique(row["technique"]).rays == KINDS]
     choice, seconds = {}, dict.fromkeys((AUTOMATIC, *names), math.inf)
-    for _ in range(repeats):                                            # interleaved: a busy moment hits all alike
+    began = time.process_time()
+    for k in range(10):                                                 # interleaved: a busy moment hits all alike
+        if k >= repeats and time.process_time() - began > QUICK:        # small pictures are drowned in noise
+            break
         for name in seconds:
             start = time.process_time()                                 # not the clock: others may use the processor too
             result = trace(scene, name, core, size)
