@@ -35,13 +35,15 @@ SCENES = {"fast": ((40, False), (700, False), (250, True)), "pure": ((16, False)
 #: Rays of each kind: numpy's calls cost the same for few rays as for many, so the seconds of a ray are those by which
 #: more rays take longer than fewer.
 RAYS = {"fast": (1000, 100), "pure": (40, 8)}
+#: Rays that are traced together, about, as the tracers have it.
+WAVE = 65_536
 #: A batch with more tests than this is not run: the smaller one has to do.
 TESTS = 90_000
 #: A technique whose time per ray is wrong by more than this factor on a scene that it was fitted on is no candidate:
 #: its time does not follow from its counters.
 TRUST = 3.0
 #: Seconds of processor time after which no further technique is calibrated; those left are no candidates.
-BUDGET = 0.65
+BUDGET = 0.5
 #: The whole picture must be faster than with the standard technique by this part, as the model is not exact.
 MARGIN = 0.2
 #: Techniques estimated to take this many times as long as it are not traced to compare.
@@ -210,6 +212,8 @@ class Model:
         Seconds of a ray, of a test, of a step.
     shading : float
         Seconds for each ray that a picture takes besides, whatever the technique; known of STANDARD.
+    wave : float
+        Seconds of a batch of rays, however few.
     """
 
     build: tuple
@@ -218,6 +222,7 @@ class Model:
     lazy: tuple = (-math.inf, 0.0)
     lights: bool = False
     shading: float = 0.0
+    wave: float = 0.0
 
     def build_seconds(self, n, lights=1):
         """Time to build over n primitives, for some lights."""
@@ -307,7 +312,7 @@ def _uneven(n):
 
 def _fit(name, core, scenes, looked, sets, brute):
     """The model of one technique, and the largest factor by which it is wrong; `brute` is brute force's, once it is known."""
-    builds, lazies, counts, times = [], [], {}, []
+    builds, lazies, counts, times, waves = [], [], {}, [], []
     row = technique(name)
     for scene, batches in zip(scenes, sets):
         start = time.thread_time()
@@ -320,7 +325,8 @@ def _fit(name, core, scenes, looked, sets, brute):
             if row.family == "directional":                             # lists that are made when the first rays come
                 first, again = (_measured(index, batch.take(slice(0, RAYS[core][1])), RAYS[core][1])[2] for _ in range(2))
                 lazies[-1] += max(first - again, 0.0) * RAYS[core][1]
-            *both, seconds = _measured(index, batch, RAYS[core][1])
+            *both, seconds, wave = _measured(index, batch, RAYS[core][1])
+            waves.append(wave)
             counts.setdefault(batch.kind, []).append(both)
             times.append((*both, seconds))
         tree = index.figures.get("depth", 0) > 2
@@ -337,16 +343,16 @@ def _fit(name, core, scenes, looked, sets, brute):
     n_it, n_ts, seconds = np.array(times).T
     if brute is None:
         ray, test = _not_negative(np.stack([np.ones_like(n_it), n_it], axis=1), seconds)
-        return Model(power(builds), fitted, (ray, test, 0.0)), 1.0
+        return Model(power(builds), fitted, (ray, test, 0.0), wave=float(np.median(waves))), 1.0
     test = brute.ns[1]
     ray, step = _not_negative(np.stack([np.ones_like(n_ts), n_ts], axis=1) / seconds[:, None], 1.0 - test * n_it / seconds, relative=False)
     ratio = (ray + test * n_it + step * n_ts) / seconds
-    model = Model(power(builds), fitted, (ray, test, step), power(lazies), row.rays == ("shadow",))
+    model = Model(power(builds), fitted, (ray, test, step), power(lazies), row.rays == ("shadow",), wave=float(np.median(waves)))
     return model, float(np.maximum(ratio, 1.0 / ratio).max())
 
 
 def _measured(index, batch, fewer):
-    """N_IT, N_TS and seconds of a ray; without the share that does not grow with the number of rays."""
+    """N_IT, N_TS and seconds of a ray, and the seconds that do not grow with the number of rays."""
     def ask(rays):
         start = time.thread_time()                                      # not the clock: others may use the processor too
         answer = rays.ask(index, count=True)
@@ -356,9 +362,10 @@ def _measured(index, batch, fewer):
 
     n_it, n_ts, less = ask(batch.take(slice(0, fewer)))
     if n_it * len(batch) > TESTS or len(batch) <= fewer:
-        return n_it, n_ts, less / fewer
+        return n_it, n_ts, less / fewer, 0.0
     n_it, n_ts, seconds = ask(batch)
-    return n_it, n_ts, max((seconds - less) / (len(batch) - fewer), 0.1 * seconds / len(batch))
+    ray = max((seconds - less) / (len(batch) - fewer), 0.1 * seconds / len(batch))
+    return n_it, n_ts, ray, max(less - fewer * ray, 0.0)
 
 
 def _growth(n, clutter, count, tree):
@@ -422,8 +429,8 @@ def choose(seen, rays, core="fast"):
         for kind, number in rays.items():
             if name in serve[kind]:
                 n_it, n_ts, seconds = model.per_ray(kind, seen.n, seen.clutter)
-                row |= {f"N_IT {kind}": n_it, f"N_TS {kind}": n_ts, f"s {kind}": seconds * number}
-                cost[name, kind] = seconds * number
+                cost[name, kind] = seconds * number + model.wave * (1 + number // WAVE)
+                row |= {f"N_IT {kind}": n_it, f"N_TS {kind}": n_ts, f"s {kind}": cost[name, kind]}
         if len(row) > 2:
             row["s"] = total([name if name in serve[kind] else STANDARD for kind in rays])
             rows.append(row)

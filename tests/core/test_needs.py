@@ -67,7 +67,7 @@ def test_choice():
     assert set(choice) == {"primary", "shadow"} and "brute" not in choice.values()
     assert [r["s"] for r in rows] == sorted(r["s"] for r in rows)
     models, _ = needs.calibration()
-    costs = {name: m.build_seconds(seen.n) + sum(m.per_ray(k, seen.n, seen.clutter)[2] for k in choice) * 100_000 for name, m in models.items()
+    costs = {name: m.build_seconds(seen.n) + sum(m.per_ray(k, seen.n, seen.clutter)[2] for k in choice) * 100_000 + 4 * m.wave for name, m in models.items()
              if catalogue.technique(name).rays == needs.KINDS}
     whole = [row for row in rows if row["technique"] in costs]
     assert whole[0]["technique"] == min(costs, key=costs.get) and whole[0]["s"] == pytest.approx(min(costs.values()))
@@ -93,6 +93,14 @@ def test_techniques_for_some_kinds_of_ray_are_chosen_for_these(monkeypatch):
     assert np.array_equal(free.image, fixed.image)
     forced = trace(lit, size=(16, 12), primary="image-directory", shadow="light-buffer")
     assert np.array_equal(forced.image, fixed.image)
+
+
+def test_few_rays_cost_a_wave(monkeypatch):
+    def model(wave, ray):
+        return needs.Model((-20.0, 0.0), {("primary", c): (0.0, 0.0, 0.0, False) for c in ("n_it", "n_ts")}, (ray, 0.0, 0.0), wave=wave)
+    monkeypatch.setitem(needs._known, "fast", ({"bvh": model(0.01, 1e-6), "grid": model(0.001, 3e-6)}, 0.0))
+    seen = needs.survey(needs._even(100))
+    assert [needs.choose(seen, {"primary": n})[0]["primary"] for n in (1000, 100_000)] == ["grid", "bvh"]
 
 
 def test_choice_follows_the_model(monkeypatch):
