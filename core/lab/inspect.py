@@ -14,7 +14,7 @@ import numpy as np
 
 from ..catalogue import build
 from ..errors import SceneError
-from ..rendering import trace
+from ..rendering import Rendering
 from ..scene.layout import Layout, to_world
 from ..scene.scene import Mesh, Object, Scene
 from . import report
@@ -141,9 +141,11 @@ def measure(scene, technique="bvh", size=None, depth=5, progress=None, parameter
     Result
     """
     index = build(scene, technique, **(parameters or {}))
-    ledger = Ledger(index, len(scene.objects))
-    result = trace(scene, index=index, size=size or picture_size(scene), depth=depth, count=True, progress=progress)
-    return ledger, result
+    rendering = Rendering(scene, index=index, size=size or picture_size(scene), depth=depth, count=True, progress=progress)
+    ledger = Ledger(index, len(scene.objects))                          # from here: what is asked beforehand is no part of the picture
+    for _ in rendering.tiles():
+        pass
+    return ledger, rendering.result
 
 
 def work_of(result):
