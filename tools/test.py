@@ -1,6 +1,7 @@
 """Run the tests in every Blender there is, all parts even if one fails, and sum up: tools/test.py [PART ...]
 
 Parts: core (no bpy) · addon (bpy 5.2) · addon-4.5 (bpy 4.5 LTS) · blender (a real `blender -b`) · gui (a real window under Xvfb).
+The core, which takes as long as all others, runs beside them; each line says which part it is from.
 """
 import os
 import re
@@ -8,7 +9,9 @@ import signal
 import subprocess
 import sys
 import tempfile
+import threading
 import time
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 from blenders import find_blender, find_window
@@ -75,6 +78,17 @@ def _test_site(command):
     return str(site)
 
 
+_running = []
+
+
+def _stop(*_):
+    """Interrupted: nothing goes on behind our back."""
+    for process in _running:
+        if process.poll() is None:
+            os.killpg(process.pid, signal.SIGKILL)
+    os._exit(143)
+
+
 def run(name):
     """Run one part; returns (verdict, figures, seconds)."""
     start = time.monotonic()
@@ -83,7 +97,7 @@ def run(name):
     except LeftOut as reason:
         return "LEFT OUT", {"reason": str(reason)}, 0.0
     command = [str(word) for word in command]
-    print(f"\n#### {name}: {' '.join(command)}", flush=True)
+    print(f"#### {name}: {' '.join(command)}", flush=True)
     lines = []
     with tempfile.TemporaryDirectory(prefix="rayscope-user-") as user:
         # Only a Blender that is started anew needs its folder from here; the bpy module's is made in tests/addon/conftest.py.
@@ -92,17 +106,16 @@ def run(name):
             command, cwd=ROOT, env={**os.environ, **environment, **fresh}, text=True, errors="replace",
             stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, start_new_session=True,
         )  # fmt: skip
-        signal.signal(signal.SIGALRM, lambda *_: os.killpg(process.pid, signal.SIGKILL))
-        signal.alarm(LONGEST)
+        _running.append(process)
+        alarm = threading.Timer(LONGEST, os.killpg, (process.pid, signal.SIGKILL))
+        alarm.start()
         try:
             for line in process.stdout:
-                print(line, end="", flush=True)
+                print(f"{name}: {line}", end="", flush=True)
                 lines.append(line)
             code = process.wait()
-        finally:  # interrupted: nothing goes on behind our back
-            signal.alarm(0)
-            if process.poll() is None:
-                os.killpg(process.pid, signal.SIGKILL)
+        finally:
+            alarm.cancel()
     figures = _figures(lines)
     seconds = time.monotonic() - start
     if code == -signal.SIGKILL and seconds >= LONGEST:
@@ -119,11 +132,17 @@ def _figures(lines):
 
 
 def main(names):
-    signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))
+    signal.signal(signal.SIGTERM, _stop)
+    signal.signal(signal.SIGINT, _stop)
     unknown = set(names) - set(PARTS)
     if unknown:
         sys.exit(f"unknown part: {', '.join(unknown)}; there are {', '.join(PARTS)}")
-    results = {name: run(name) for name in names or PARTS}
+    names = names or list(PARTS)
+    others = [name for name in names if name != "core"]
+    with ThreadPoolExecutor(1) as beside:
+        first = beside.submit(run, "core") if "core" in names else None
+        results = {name: run(name) for name in others}
+        results = ({"core": first.result()} if first else {}) | results
     print("\n#### Summary")
     total = dict.fromkeys(("passed", "failed", "error", "skipped"), 0)
     for name, (verdict, figures, seconds) in results.items():

@@ -9,6 +9,8 @@ import pytest
 from rayscope.core import Camera, Cancelled, Light, Material, Mesh, Object, ParameterError, Scene, World, solids, trace
 from rayscope.core.rendering import Rendering
 
+pytestmark = pytest.mark.slow
+
 CORES = pytest.mark.parametrize("core", ["fast", "pure"])
 WAYS = pytest.mark.parametrize("way", ["corners", "variance"])
 

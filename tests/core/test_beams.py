@@ -17,6 +17,8 @@ from rayscope.core.scene.faces import CORNERS, Faces, convex_pieces
 
 from .datasets import DATASETS
 
+pytestmark = pytest.mark.slow
+
 CORES = pytest.mark.parametrize("core", ["fast", "pure"])
 #: Image plane coordinates are tested with this many pixels.
 SIZE = (12, 9)

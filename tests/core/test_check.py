@@ -7,6 +7,8 @@ from rayscope.core.errors import ParameterError
 from rayscope.core.lab import check
 from rayscope.core.command import main
 
+pytestmark = pytest.mark.slow
+
 #: The example in the documentation of `check`, as a student would copy it.
 EXAMPLE = textwrap.dedent(check.__doc__.split("::\n", 1)[1].split("\nWhat its methods", 1)[0])
 

@@ -14,6 +14,8 @@ from rayscope.core.fast.generalised.cones_tracer import scattering
 
 from .footprint_scenes import displayed, lit, rmse, with_area, with_cylinder, with_glass, with_mesh
 
+pytestmark = pytest.mark.slow
+
 SCENES = {
     "ball": lit, "rectangle": lambda: with_area("rectangle"), "ellipse": lambda: with_area("ellipse"),
     "glass": with_glass, "mesh": with_mesh, "cylinder": with_cylinder,

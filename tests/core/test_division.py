@@ -4,6 +4,8 @@ import pytest
 
 from rayscope.core.lab import division
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture(scope="module")
 def result():

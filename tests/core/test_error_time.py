@@ -14,6 +14,8 @@ from rayscope.core.lab import error_time as lab
 from rayscope.core.lab.picture_error import STEP, displayed, errors
 from rayscope.core.lab.tessellate import curved, tessellated
 
+pytestmark = pytest.mark.slow
+
 
 def room(mirror=True, soft=True, ball=True):
     """A floor with or without a mirror, a lamp with an extent, an analytic ball."""

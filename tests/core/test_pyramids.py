@@ -10,6 +10,8 @@ from rayscope.core.rendering import Rendering
 
 from .footprint_scenes import ball_mesh, lit, rmse, with_area, with_cylinder, with_mesh
 
+pytestmark = pytest.mark.slow
+
 CORES = pytest.mark.parametrize("core", ["fast", "pure"])
 
 

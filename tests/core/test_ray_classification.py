@@ -16,6 +16,8 @@ from rayscope.core.scene.scene import Mesh, Object, Shapes
 
 from .datasets import instances, jittered_sphere, random_soup, soup
 
+pytestmark = pytest.mark.slow
+
 CORES = ("pure", "fast")
 
 

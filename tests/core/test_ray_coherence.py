@@ -16,6 +16,8 @@ from .datasets import jittered_sphere, points_of
 from .test_directional import same
 from .test_properties import BY_NAME, scene_of
 
+pytestmark = pytest.mark.slow
+
 CORES = ("pure", "fast")
 
 
