@@ -355,7 +355,8 @@ class _Sweep:
 
     def _measure(self, settings, work, reference, cost):
         """Trace all settings: once to count, then turn by turn for the times, as often as there is time."""
-        order = sorted(range(len(settings)), key=lambda i: work[i])
+        # Ways that may take any time come last.
+        order = sorted(range(len(settings)), key=lambda i: (bool(settings[i].technique), work[i]))
         spent = {}
         for turn in range(1 + REPEATS):
             for place, i in enumerate(order):

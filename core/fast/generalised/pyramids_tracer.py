@@ -34,6 +34,7 @@ class PyramidTracer(FootprintTracer):
         owner = np.arange(len(outlines))
         least, most = corners.min(axis=1), corners.max(axis=1)
         for j in range(int(size.max(initial=1)) if (size > 1).any() else 0):
+            self.check()                                    # pieces grow as the square of what is in a pixel
             other = begin[owner] + j
             there = (j < number[owner]) & (other != owner)
             other = np.where(there, other, 0)
