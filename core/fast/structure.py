@@ -100,8 +100,8 @@ class Structure:
         -------
         Hits
         """
-        answers = self._ask(Closest, origins, directions, t_min, t_max, count, progress, leaving)
-        n, rays, index, parts, counts = answers
+        n = len(origins)
+        parts, counts = self._ask(Closest, origins, directions, t_min, t_max, count, progress, leaving)
         hits = Hits(t=np.full(n, np.inf), primitive=np.full(n, -1, np.int64), object=np.full(n, -1, np.int32),
                     u=np.zeros(n), v=np.zeros(n), part=np.zeros(n, np.int32), normal=np.zeros((3, n)).T,
                     point=np.zeros((3, n)).T, error=np.zeros(n), **counts)
@@ -134,14 +134,14 @@ class Structure:
         -------
         ndarray of bool, shape (n,), or (ndarray, dict of ndarray) with the counts n_it, n_ts, n_ets, n_eets
         """
-        n, rays, index, parts, counts = self._ask(Occluded, origins, directions, t_min, t_max, count, progress, leaving)
-        blocked = np.zeros(n, bool)
+        parts, counts = self._ask(Occluded, origins, directions, t_min, t_max, count, progress, leaving)
+        blocked = np.zeros(len(origins), bool)
         for number, query in parts:
             blocked[number[query.blocked]] = True
         return (blocked, counts) if count else blocked
 
     def _ask(self, question, origins, directions, t_min, t_max, count, progress, leaving):
-        """Put a question to all rays, batch by batch."""
+        """Put a question to all rays, batch by batch; pairs (numbers of rays, their query), and the counts of all."""
         n = len(origins)
         rays, index = Rays.checked(origins, directions, t_min, t_max)
         if leaving is not None and self.follows:
@@ -160,4 +160,4 @@ class Structure:
                 parts.append((number, query))
             if progress:
                 progress(min(1.0, (start + batch.n) / rays.n))
-        return n, rays, index, parts, counts
+        return parts, counts

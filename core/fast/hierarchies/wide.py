@@ -16,7 +16,7 @@ from .tree import half_area
 
 #: In unit space: 2**-24 for the origin, 2 x 3 x 2**-24 for the distance, doubled.
 PAD = 16 * 2.0**-24
-#: The smallest component of a direction, relative to its largest; see `UnitRays`.
+#: The smallest component of a direction, relative to its largest; see `runs`.
 TINY = 2.0**-60
 #: (ray, node) pairs taken up at a time.
 CHUNK = 16_384
