@@ -86,9 +86,9 @@ class Closest:
         nearest = np.flatnonzero(t == self.t.take(ray))
         ray, item = ray.take(nearest), item.take(nearest)
         self.item[ray] = item
-        # Of hits at the same t the assignment kept the last; give way to lower numbers until none is left.
-        while len(lower := np.flatnonzero(self.item.take(ray) > item)):
-            self.item[ray[lower]] = item[lower]
+        # Of hits at the same t the assignment kept the last.
+        if (self.item.take(ray) > item).any():
+            np.minimum.at(self.item, ray, item)
         mine = np.flatnonzero(self.item.take(ray) == item)
         ray, better = ray.take(mine), nearest.take(mine)
         self.u[ray], self.v[ray], self.detail[ray] = u.take(better), v.take(better), detail.take(better)
