@@ -1,5 +1,6 @@
 """Division of space: what its techniques owe each other, their guards, and what each one is for."""
 
+import functools
 import math
 
 import numpy as np
@@ -10,7 +11,7 @@ import rayscope.core.pure.subdivision.grid as pure_grid
 from rayscope.core import MemoryEstimateError, ParameterError, Scene, build, solids
 from rayscope.core.figures import PER_RAY
 from rayscope.core.fast.rays import Rays
-from rayscope.core.fast.subdivision import leaps
+from rayscope.core.fast.subdivision import leaps, separated_grid
 from rayscope.core.fast.subdivision.lists import Lists, PairSet, Recent
 from rayscope.core.fast.subdivision.sieve import Sieve
 from rayscope.core.scene.scene import Object, Shapes
@@ -327,6 +328,48 @@ def test_separated_lists_lose_nothing_and_test_more(axes):
             index.figures["surplus"]
         )
     assert counts(index, o, d)[0][0].sum() > counts(exact, o, d)[0][0].sum()
+
+
+@pytest.mark.parametrize("kind", [separated_grid.Bits, separated_grid.Sorted])
+@pytest.mark.parametrize("axes", [2, 3])
+def test_slabs_in_common(kind, axes):
+    """The intersections are those of sets, with as many primitives as bit vectors need two summaries for."""
+    rng, n, slabs = np.random.default_rng(4), 30_000, (5, 3, 7)[:axes]
+    members = [[np.flatnonzero(rng.random(n) < part) for part in rng.random(k) ** 6] for k in slabs]
+    members[0][2] = np.zeros(0, int)
+    own = []
+    for lists in members:
+        slab = np.repeat(np.arange(len(lists)), [len(x) for x in lists])
+        pairs = sorted(zip(np.concatenate(lists).tolist(), slab.tolist()))
+        own.append(kind(np.array([s for _, s in pairs]), np.array([i for i, _ in pairs]), len(lists), n))
+    cells = np.stack([rng.integers(0, k, 40) for k in slabs])
+    which, item = own[0].common(own, list(cells))
+    for number, cell in enumerate(cells.T):
+        expected = functools.reduce(np.intersect1d, [lists[k] for lists, k in zip(members, cell)])
+        assert np.array_equal(np.sort(item[which == number]), expected)
+    assert kind is not separated_grid.Bits or len(own[0].levels) == 3
+
+
+@pytest.mark.parametrize("intersect", ["bits", "sorted"])
+def test_candidates_that_are_forgotten_are_found_again(intersect, monkeypatch):
+    scene, (o, d) = soup(300, 0.1), rays(500)
+    index = build(scene, "separated-grid", intersect=intersect)
+    hits, truth = index.closest(o, d), build(scene, "brute").closest(o, d)
+    for name, little in (("CELLS", 16), ("TOGETHER", 40), ("REMEMBERED", 100)):
+        monkeypatch.setattr(separated_grid, name, little)
+    found = index.closest(o, d, count=True)
+    for own in (hits, found, index.closest(o, d)):
+        assert np.array_equal(own.t, truth.t) and np.array_equal(own.primitive, truth.primitive)
+    exact = build(scene, "grid")
+    assert np.array_equal(found.n_ts, exact.closest(o, d, count=True).n_ts) and found.n_it.sum() > 1000
+
+
+def test_separated_grid_of_more_cells_than_32_bits_count():
+    scene, (o, d) = soup(3, 0.5), rays(50)
+    index = build(scene, "separated-grid", resolution=2000, rule="regular")
+    assert index.resolution.prod() > 2**32
+    hits, truth = index.closest(o, d), build(scene, "brute").closest(o, d)
+    assert np.array_equal(hits.t, truth.t) and (truth.primitive >= 0).sum() > 3
 
 
 @pytest.mark.parametrize("scale", [1e-6, 1.0, 1e6])

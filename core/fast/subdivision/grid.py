@@ -105,7 +105,11 @@ class Grid(Structure):
                 end = min(end, done)
             some = order[begin:end]
             for piece in range(0, int(count[some].sum()), PAIRS) if len(some) == 1 else (0,):
-                cell, item = self._reached(some, first, extent, count, piece, begin < done)
+                item = np.repeat(some, count[some])
+                place = ranges(np.zeros(len(some), np.int64), count[some])
+                if len(some) == 1:
+                    item, place = item[piece : piece + PAIRS], place[piece : piece + PAIRS]
+                cell, item = self._reached(item, place, first, extent, begin < done)
                 cells.append(cell)
                 items.append(item)
                 total += len(cell)
@@ -118,13 +122,8 @@ class Grid(Structure):
             progress(begin / p.n)
         return np.concatenate(cells), np.concatenate(items)
 
-    def _reached(self, some, first, extent, count, piece, sure):
-        """The cells that some primitives reach into; of a single one, only PAIRS cells from number `piece` on are
-        looked at."""
-        item = np.repeat(some, count[some])
-        place = ranges(np.zeros(len(some), np.int64), count[some])
-        if len(some) == 1:
-            item, place = item[piece : piece + PAIRS], place[piece : piece + PAIRS]
+    def _reached(self, item, place, first, extent, sure):
+        """Pairs (cell, item) where primitives reach into cells, of the `place`-th cells that their boxes reach into."""
         ey, ez = extent[item, 1], extent[item, 2]
         x, rest = np.divmod(place, ey * ez)
         y, z = np.divmod(rest, ez)

@@ -8,6 +8,8 @@ to enter a cell too many is to test too much. Where rays are counted, they are c
 Along an axis on which a ray runs down, cells are numbered from above: then every ray runs up.
 """
 
+import math
+
 import numpy as np
 
 from ..hierarchies.wide import along_curve
@@ -57,6 +59,13 @@ class Blocks:
         return [a | mask for a in k], np.flatnonzero(code == 0)
 
 
+class NoRegions:
+    """No region is known to be empty: rays go from cell to cell."""
+
+    def last(self, cell, k, flip):
+        return k, np.arange(len(cell))
+
+
 def walk(grid, regions, rays, ray, t_in, t_out, visits, query):
     """Visit the filled cells that rays come to.
 
@@ -73,7 +82,8 @@ def walk(grid, regions, rays, ray, t_in, t_out, visits, query):
     waiting = _columns(grid, rays, ray, t_in, t_out)
     n, begin = len(ray), min(POOL, len(ray))
     pool = [column[:begin] for column in waiting]
-    stride, top = [np.int32(s) for s in grid.stride], len(grid.lists.count) - 1
+    top = math.prod(grid.resolution.tolist()) - 1
+    stride = [np.int32(s) if top < 2**31 else s for s in grid.stride]
     while len(pool[0]):
         k, flip, first, gap, rate, place = (pool[i : i + 3] for i in range(0, 18, 3))
         t, t_end, ray = pool[18:]

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-#: (ray, primitive) pairs tested at a time.
-PAIRS = 262_144
+#: (ray, primitive) pairs tested at a time, and pairs that a sieve is given together.
+PAIRS, SIEVED = 262_144, 1 << 21
 
 
 class Lists:
@@ -147,11 +147,13 @@ class Visits:
             self.counts.elementary(ray, count == 0)
         if not len(filled):
             return
-        ray = ray.take(filled)
-        if self.sieve is not None:
-            self.test(*self.sieve.pairs(self.aimed, ray, number.take(filled)))
-        else:
-            self.test_ranges(ray, first.take(filled), count.take(filled))
+        ray, count = ray.take(filled), count.take(filled)
+        if self.sieve is None:
+            self.test_ranges(ray, first.take(filled), count)
+            return
+        number = number.take(filled)
+        for some in chunks(count, SIEVED):
+            self.test(*self.sieve.pairs(self.aimed, ray[some], number[some]))
 
     def test_ranges(self, ray, first, count):
         """Test rays against ranges of ``lists.items``."""

@@ -8,7 +8,7 @@ import functools
 import itertools
 import math
 import operator
-from bisect import bisect_left
+from bisect import bisect_left, bisect_right
 
 from ...cell_shapes import axes_of
 from ...cells import too_many_slabs
@@ -64,22 +64,25 @@ class SeparatedGrid(Grid):
         )
 
     def _surplus(self):
-        """References that intersecting lists adds to those of exact lists, as a part of these; from a sample of
-        primitives."""
-        ranges = [
+        """References that intersecting lists adds to those of exact lists, as a part of these; from a sample of them."""
+        boxes = [
             [range(self._index(a, p.lo[a] - self.margin), self._index(a, p.hi[a] + self.margin) + 1) for a in range(3)]
             for p in self.primitives
         ]
-        every = 1 + sum(math.prod(map(len, r)) for r in ranges) // SAMPLE
-        listed = exact = 0
-        for primitive, some in zip(self.primitives[::every], ranges[::every]):
-            for index in itertools.product(*some):
-                listed += 1
-                exact += primitive.overlaps(
-                    [self._plane(a, index[a]) - self.margin for a in range(3)],
-                    [self._plane(a, index[a] + 1) + self.margin for a in range(3)],
-                )
-        return listed / max(exact, 1) - 1.0
+        ends = list(itertools.accumulate(math.prod(map(len, box)) for box in boxes))
+        sample = range(0, ends[-1], 1 + ends[-1] // SAMPLE)
+        exact = 0
+        for pair in sample:
+            item = bisect_right(ends, pair)
+            place, index = ends[item] - 1 - pair, []
+            for slabs in boxes[item]:
+                place, k = divmod(place, len(slabs))
+                index.append(slabs[k])
+            exact += self.primitives[item].overlaps(
+                [self._plane(a, index[a]) - self.margin for a in range(3)],
+                [self._plane(a, index[a] + 1) + self.margin for a in range(3)],
+            )
+        return len(sample) / max(exact, 1) - 1.0
 
     def _refuse_too_many(self, size, rule, density):
         """Cells take no memory here."""
