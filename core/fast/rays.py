@@ -6,6 +6,10 @@ import numpy as np
 
 #: kx, ky, kz for each main axis, then for each that the ray runs against.
 AXES = np.array([[1, 2, 0, 2, 0, 1], [2, 0, 1, 1, 2, 0], [0, 1, 2, 0, 1, 2]])
+#: Rays looked at together: columns that stay in the cache.
+BLOCK = 8_192
+#: The bits of a float64 that hold its exponent.
+EXPONENT = np.int64(0x7FF << 52)
 
 
 class Rays:
@@ -20,17 +24,19 @@ class Rays:
     o, d : ndarray, shape (3, n), float64
         Origins and scaled directions.
     t_min, t_max : ndarray, shape (n,)
-    exponent : ndarray, shape (n,), int
-        The scaled direction times 2**exponent is the caller's.
+    power : ndarray, shape (n,)
+        The scaled direction times this power of two is the caller's.
     prepared
         What a structure that is asked found out about the rays when it divided them.
     leaving : ndarray, shape (2, n), int, or None
         Object and primitive that each ray leaves, where that is known; -1 for none.
+    apex : tuple of float, or None
+        The point where all rays start, where it is known that there is one.
     """
 
-    def __init__(self, o, d, t_min, t_max, exponent, leaving=None):
+    def __init__(self, o, d, t_min, t_max, power, leaving=None, apex=None):
         self.n = o.shape[1]
-        self.o, self.d, self.t_min, self.t_max, self.exponent, self.leaving = o, d, t_min, t_max, exponent, leaving
+        self.o, self.d, self.t_min, self.t_max, self.power, self.leaving, self.apex = o, d, t_min, t_max, power, leaving, apex
         self.prepared = None
 
     @classmethod
@@ -54,33 +60,33 @@ class Rays:
         n = origins.shape[1]
         if directions.shape[1] != n:
             raise ValueError(f"{n} origins but {directions.shape[1]} directions.")
-        t_min, t_max = (np.broadcast_to(np.asarray(t, float), (n,)) for t in (t_min, t_max))
-        size = np.abs(directions)
-        largest = np.maximum(np.maximum(size[0], size[1]), size[2])
-        finite = np.isfinite(origins[0]) & np.isfinite(origins[1]) & np.isfinite(origins[2])
-        usable = finite & (largest > 0.0) & (largest < np.inf) & (t_min <= t_max)
-        index = np.flatnonzero(usable)
-        if len(index) < n:
-            origins, directions, largest = _taken(origins, index), _taken(directions, index), largest[index]
-            t_min, t_max = t_min[index], t_max[index]
-        exponent = np.frexp(largest)[1] - 1
-        if len(index) and max(exponent.max(), -exponent.min()) < 1000:
-            # Multiplying by a power of two is as exact as ldexp, and several times faster.
-            power = np.ldexp(1.0, exponent)
-            return cls(origins, directions * (1.0 / power), t_min * power, t_max * power, exponent), index
-        return cls(origins, np.ldexp(directions, -exponent), np.ldexp(t_min, exponent), np.ldexp(t_max, exponent), exponent), index
+        t_min, t_max = (t if t.ndim == 0 else np.broadcast_to(t, (n,)) for t in (np.asarray(t, float) for t in (t_min, t_max)))
+        ordered = t_min <= t_max
+        apex = _apex(origins)
+        ends = apex if apex else (origins.min(initial=0.0), origins.max(initial=0.0))
+        scaled, power, least, most = _scaled(directions)
+        # Extremes tell at once that nothing is wrong, as a rule; NaN is neither.
+        if least > 0.0 and most < np.inf and np.isfinite(ends).all() and ordered.all():
+            return cls(origins, scaled, t_min * power, t_max * power, power, apex=apex), np.arange(n)
+        with np.errstate(invalid="ignore"):
+            index = np.flatnonzero(np.isfinite(origins).all(axis=0) & np.isfinite(directions).all(axis=0) & directions.any(axis=0) & ordered)
+        t_min, t_max = (t if t.ndim == 0 else t[index] for t in (t_min, t_max))
+        directions = _taken(directions, index)
+        # The tiniest numbers have no exponent among their bits.
+        power = np.ldexp(1.0, np.frexp(np.abs(directions).max(axis=0))[1] - 1) if len(index) else np.zeros(0)
+        return cls(_taken(origins, index), directions / power, t_min * power, t_max * power, power, apex=apex), index
 
     def take(self, index):
         """Some of the rays; `index` is an array or a slice."""
-        columns = self.t_min, self.t_max, self.exponent
+        columns = self.t_min, self.t_max, self.power
         leaving = None if self.leaving is None else self.leaving[:, index]
         if isinstance(index, slice):
-            return Rays(self.o[:, index], self.d[:, index], *(c[index] for c in columns), leaving)
-        return Rays(_taken(self.o, index), _taken(self.d, index), *(c.take(index) for c in columns), leaving)
+            return Rays(self.o[:, index], self.d[:, index], *(c[index] for c in columns), leaving, self.apex)
+        return Rays(_taken(self.o, index), _taken(self.d, index), *(c.take(index) for c in columns), leaving, self.apex)
 
-    def callers_t(self, t):
-        """t in multiples of the caller's directions."""
-        return np.ldexp(t, -self.exponent)
+    def callers_t(self, t, ray):
+        """t of some rays in multiples of the caller's directions."""
+        return t / self.power.take(ray)
 
     @cached_property
     def inverse(self):
@@ -97,19 +103,31 @@ class Rays:
     @cached_property
     def main_axis(self):
         """The direction's largest component, shape (n,); the last of two, but the first of three that are equal."""
-        x, y, z = np.abs(self.d)
-        return np.where(z > np.maximum(x, y), 2, (y > x).astype(np.int64))
+        return self.side.astype(np.int64) % 3
+
+    @cached_property
+    def side(self):
+        """Which of six ways each ray runs, shape (n,), int8: the main axis, plus 3 where it runs against it."""
+        side = np.empty(self.n, np.int8)
+        for some in blocks(self.n):
+            d = self.d[:, some]
+            x, y, z = np.abs(d)
+            last = z > np.maximum(x, y)
+            middle = (y > x) & ~last
+            x, y, z = d < 0.0
+            # All of these are bytes, 0 or 1.
+            side[some] = 2 * last.view(np.int8) + middle + 3 * (last & z | middle & y | ~(last | middle) & x).view(np.int8)
+        return side
 
     @cached_property
     def main(self):
         """The axes kx, ky, kz of :attr:`shear` where they are the same for all rays, else None."""
-        if not self.n or (self.main_axis != self.main_axis[0]).any():
-            return None
-        kz = int(self.main_axis[0])
-        against = np.signbit(self.d[kz])
-        if (against != against[0]).any():
-            return None
-        return tuple(AXES[:, kz + 3 * int(against[0])].tolist())
+        return self.main_of(slice(None))
+
+    def main_of(self, ray):
+        """The axes of :attr:`shear` where they are the same for some rays, else None."""
+        side = self.side[ray]
+        return tuple(AXES[:, side[0]].tolist()) if len(side) and (side == side[0]).all() else None
 
     @cached_property
     def shear(self):
@@ -124,20 +142,45 @@ class Rays:
         s : ndarray, shape (3, n)
             Sx, Sy, Sz.
         """
-        if self.main is not None:
-            kx, ky, kz = self.main
-            inverse = 1.0 / self.d[kz]
-            s = np.stack([self.d[kx] / self.d[kz], self.d[ky] / self.d[kz], inverse])
-            return np.broadcast_to(np.array(self.main)[:, None], (3, self.n)), self.o[list(self.main)], s
         kz = self.main_axis
         i = np.arange(self.n)
         flat = np.ascontiguousarray(self.d).ravel()
         dz = flat.take(kz * self.n + i)
         # The next axis and the one after; the other way round where the ray runs against its main axis.
-        axes = AXES.take(kz + 3 * (dz < 0.0), axis=1)
+        axes = AXES.take(self.side, axis=1)
         place = axes * self.n + i
         s = np.stack([flat.take(place[0]) / dz, flat.take(place[1]) / dz, 1.0 / dz])
         return axes, np.ascontiguousarray(self.o).ravel().take(place), s
+
+
+def blocks(n):
+    """Slices of 0 .. n whose columns stay in the cache through a few operations."""
+    return [slice(first, min(first + BLOCK, n)) for first in range(0, n, BLOCK)]
+
+
+def _apex(origins):
+    """The point where all rays start, three floats, or None."""
+    first = origins[:, :1]
+    if not origins.size or (origins[:, -1:] != first).any() or (origins != first).any():
+        return None
+    return tuple(first[:, 0].tolist())
+
+
+def _scaled(directions):
+    """Directions divided by powers of two, these, and the extremes of all directions' largest components."""
+    scaled, power = np.empty(directions.shape), np.empty(directions.shape[1])
+    least, most = np.inf, 0.0
+    for some in blocks(len(power)):
+        d = directions[:, some]
+        size = np.abs(d)
+        largest = np.maximum(np.maximum(size[0], size[1]), size[2])
+        least, most = np.minimum(least, largest.min()), np.maximum(most, largest.max())
+        # The bits of the exponent alone.
+        np.bitwise_and(largest.view(np.int64), EXPONENT, out=power[some].view(np.int64))
+        with np.errstate(all="ignore"):
+            np.divide(d, power[some], out=scaled[:, some])
+    # None for the tiniest numbers; infinite or NaN stay so.
+    return scaled, power, power.min(initial=least), most
 
 
 def _taken(columns, index):

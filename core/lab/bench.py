@@ -193,7 +193,7 @@ def _embree_calls(engine, sets, seed):
     """For each set, one call of embreex; and the number of rays."""
     calls = []
     for s in sets:
-        o, d = s.origins.astype(np.float32), s.directions.astype(np.float32)
+        o, d = (np.ascontiguousarray(c, np.float32) for c in (s.origins, s.directions))
         if s.kind == "shadow":
             far = np.full(len(s), s.t_max, np.float32)
             calls.append(lambda o=o, d=d, far=far: engine.run(o, d, far.copy(), query="OCCLUDED"))

@@ -76,10 +76,14 @@ class Camera:
         position, right, up, forward = self.frame()
         u = left + (np.asarray(x, float) / size[0]) * (right_ - left)
         v = bottom + (np.asarray(y, float) / size[1]) * (top - bottom)
-        across = u[:, None] * right + v[:, None] * up
-        if self.kind == "perspective":
-            return np.broadcast_to(position, across.shape).copy(), across + forward
-        return position + across, np.broadcast_to(forward, across.shape).copy()
+        # Stored column by column, as the fast core wants them.
+        origins, directions = np.empty((2, 3, len(u)))
+        for axis in range(3):
+            across = u * right[axis] + v * up[axis]
+            perspective = self.kind == "perspective"
+            origins[axis] = position[axis] if perspective else position[axis] + across
+            directions[axis] = across + forward[axis] if perspective else forward[axis]
+        return origins.T, directions.T
 
 
 def check_size(size):

@@ -9,6 +9,7 @@ could still be nearer, or is too near to an edge to be excluded, is tested too: 
 import numpy as np
 
 from ...hits import Cells
+from ..rays import blocks
 from .raster import Grid, spans
 from .second import Handing
 from .view import Footprints, View
@@ -19,6 +20,8 @@ TILE = 16
 LOSS = 2.0**-20
 #: Rows of pixels longer than this are not recognised.
 WIDEST = 16_384
+#: Points looked at together when a grid is recognised.
+CACHED = 8_192
 #: Pairs of footprints and rays collected before they are tested.
 PAIRS = 262_144
 
@@ -66,17 +69,24 @@ class ImageDirectory(Handing):
 
     def _seen(self, rays):
         """Where rays pass the window, their length along the viewing axis, and which of them come from the camera."""
-        view = self.view
-        x, y, z = view.directions(rays.d)
-        if view.perspective:
-            own = (rays.o[0] == view.position[0]) & (rays.o[1] == view.position[1]) & (rays.o[2] == view.position[2]) & (z > 0.0)
-            with np.errstate(all="ignore"):
-                u, v = x / z, y / z
-        else:
-            own = (z > 0.0) & (np.abs(x) + np.abs(y) <= 2.0**-46 * view.scale * np.abs(rays.d).max(axis=0))
-            u, v, start, _ = view.points(rays.o)
-            own &= np.abs(start) <= 2.0**-46 * view.scale * (np.abs(rays.o).max(axis=0) + view.extra)
-        own &= (np.abs(u) <= 1.0005) & (np.abs(v) <= 1.0005) & (rays.t_min >= 0.0)
+        view, (u, v, z) = self.view, np.empty((3, rays.n))
+        own = np.empty(rays.n, bool)
+        for some in blocks(rays.n):
+            o, d = rays.o[:, some], rays.d[:, some]
+            x, y, w = view.directions(d)
+            z[some] = w
+            good = w > 0.0
+            if view.perspective:
+                if rays.apex != tuple(view.position):
+                    good &= (o[0] == view.position[0]) & (o[1] == view.position[1]) & (o[2] == view.position[2])
+                with np.errstate(all="ignore"):
+                    x, y = np.divide(x, w, out=u[some]), np.divide(y, w, out=v[some])
+            else:
+                good &= np.abs(x) + np.abs(y) <= 2.0**-46 * view.scale * np.abs(d).max(axis=0)
+                u[some], v[some], start, _ = view.points(o)
+                x, y = u[some], v[some]
+                good &= np.abs(start) <= 2.0**-46 * view.scale * (np.abs(o).max(axis=0) + view.extra)
+            own[some] = good & (np.abs(x) <= 1.0005) & (np.abs(y) <= 1.0005) & (rays.t_min[some] >= 0.0)
         if own.all():
             return u, v, z, np.arange(rays.n)
         own = np.flatnonzero(own)
@@ -130,20 +140,22 @@ class _Buffer:
             pairs.append(pair)
             waiting += len(pair[0])
             if waiting > PAIRS:
-                self._settle(pairs)
+                met = self._settle(pairs)
+                self.limit[met] = self._limit(met)
                 self._hide()
                 pairs, waiting = [], 0
-        self._settle(pairs)
+        if pairs:
+            self._settle(pairs)
 
     def _settle(self, pairs):
-        """Test the nearest footprint of each ray, then all that may still matter."""
-        if not pairs:
-            return
+        """Test the nearest footprint of each ray, then all that may still matter; the rays that were tested."""
         foot, ray, near = (np.concatenate(c) for c in zip(*pairs))
         first = self._nearest(ray, near)
         self._test(foot, ray, first)
         near[first] = -np.inf
-        self._test(foot, ray, np.flatnonzero((near >= self.limit.take(ray)) & (near > -np.inf)))
+        rest = np.flatnonzero(near > -np.inf)
+        self._test(foot, ray, rest[near.take(rest) >= self._limit(ray.take(rest))])
+        return ray.take(first)
 
     def _hide(self):
         """Find out what tiles of cells hide: all whose nearness is less than what each ray in the tile has met."""
@@ -160,10 +172,10 @@ class _Buffer:
 
     def hidden(self, some, i0, i1, j0, j1):
         """Bool per footprint that reaches from column i0 to i1, row j0 to j1: whether nearer hits hide it."""
-        nearest = self.feet.nearest.take(some)
         if self.tiles is None:
-            return np.zeros(len(some), bool)
-        a, b, c, d = i0 // TILE, i1 // TILE, j0 // TILE, j1 // TILE
+            return None
+        nearest = self.feet.nearest.take(some)
+        a, b, c, d = (c.astype(np.int64) // TILE for c in (i0, i1, j0, j1))
         t = self.tiles
         least = np.minimum(np.minimum(t[c, a], t[c, b]), np.minimum(t[d, a], t[d, b]))
         # Larger ones reach into tiles between these.
@@ -171,25 +183,28 @@ class _Buffer:
         return nearest < least
 
     def _test(self, foot, ray, which):
-        """Test pairs exactly, and bring the limits of their rays up to date."""
+        """Test pairs exactly."""
         if not len(which):
             return
-        ray = ray.take(which)
-        self.query.test(self.ray.take(ray), self.feet.item.take(foot.take(which)))
+        ray, item = ray.take(which), self.feet.item.take(foot.take(which))
+        own = self.ray.take(ray)
+        # Rays that run the same way are tested together: it is cheaper.
+        side = self.query.rays.side.take(own)
+        sides = np.flatnonzero(np.bincount(side))
+        for k in sides:
+            some = np.flatnonzero(side == k) if len(sides) > 1 else slice(None)
+            self.query.test(own[some], item[some])
         if self.query.counts:
-            self.query.counts.steps(self.ray.take(ray))
-        self.limit[ray] = self._limit(ray)
+            self.query.counts.steps(own)
 
     def _nearest(self, ray, near):
         """For each ray the pair of greatest nearness."""
-        bits = near.view(np.int32).astype(np.int64)
-        # Floats in the order of whole numbers, the negative ones too.
-        bits = np.where(bits < 0, np.int64(-0x80000000) - bits, bits) + np.int64(0x80000000)
-        key = bits << 31 | np.arange(len(near))
-        best = np.full(self.n, -1, np.int64)
-        np.maximum.at(best, ray, key)
-        best = best[best >= 0]
-        return best & 0x7FFFFFFF
+        best, rest = np.full(self.n, -1, np.int64), np.arange(len(ray))
+        # Of several for one ray the last is kept; those that are nearer try again.
+        while len(rest):
+            best[ray.take(rest)] = rest
+            rest = rest[near.take(rest) > near.take(best.take(ray.take(rest)))]
+        return best.take(np.flatnonzero(best >= 0))
 
     def _pairs(self):
         """Yield (footprints, rays, nearness) that may meet."""
@@ -216,8 +231,8 @@ class _Buffer:
             v *= feet.near_v.take(foot)
             near += v
             near += feet.near.take(foot)
-            keep = np.flatnonzero(near >= self.limit.take(ray))
-            if len(keep) < len(near):
+            if self.tiles is not None:
+                keep = np.flatnonzero(near >= self.limit.take(ray))
                 foot, ray, near = foot.take(keep), ray.take(keep), near.take(keep)
             yield foot, ray, near
 
@@ -262,15 +277,19 @@ def pixel_grid(u, v):
         dv = (v[-1] - v[0]) / max(rows - 1, 1)
         u0, v0 = float(u[0] - offset * du), float(v[0])
         half_u = half_v = 0.0
-        for j in range(rows):
-            a, b = max(0, j * width - offset), min(n, (j + 1) * width - offset)
+        # Rows that are cut off, then the full ones, some at a time.
+        first = -(-offset // width)
+        last = (n + offset) // width
+        some = max(1, CACHED // width)
+        parts = [(0, 1)] * (first > 0) + [(j, min(j + some, last)) for j in range(first, last, some)] + [(rows - 1, rows)] * (rows > max(first, last))
+        for j, end in parts:
+            a, b = max(0, j * width - offset), min(n, end * width - offset)
             i = a + offset - j * width
-            row = u[a:b] - (u0 + i * du)
-            row -= k[:b - a] * du
+            shape = end - j, (b - a) // (end - j)
+            row = u[a:b].reshape(shape) - (u0 + (i + k[:shape[1]]) * du)
             half_u = max(half_u, float(row.max()), -float(row.min()))
-            row = v[a:b]
-            middle = v0 + j * dv
-            half_v = max(half_v, float(row.max()) - middle, middle - float(row.min()))
+            row = v[a:b].reshape(shape) - (v0 + np.arange(j, end) * dv)[:, None]
+            half_v = max(half_v, float(row.max()), -float(row.min()))
             if not (half_u <= 0.1 * du and half_v <= 0.1 * dv):
                 return None, 0
     if not (du > 0.0 and dv > 0.0 and half_u <= 0.1 * du and half_v <= 0.1 * dv):

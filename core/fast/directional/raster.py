@@ -56,7 +56,7 @@ def spans(feet, grid, hidden=None):
     grid : Grid
     hidden : callable, optional
         ``hidden(some, i0, i1, j0, j1)``: a mask of the footprints `some`, which reach from column i0 to i1 and row j0 to j1, that
-        need not be listed any more.
+        need not be listed any more; or None if all must.
 
     Yields
     ------
@@ -70,6 +70,8 @@ def spans(feet, grid, hidden=None):
     high = one(grid.half_v / grid.dv + 2.0**-10 + grid.rows * 2.0**-20)
     half_v = one(grid.half_v + grid.dv * (2.0**-10 + grid.rows * 2.0**-20))
     last_i, last_j = one(grid.columns - 1), one(grid.rows - 1)
+    # Beyond these no row is near.
+    v_lo, v_hi = one(grid.v0 - grid.dv), one(grid.v0 + grid.rows * grid.dv)
 
     def column(u, sign):
         u = (u - one(grid.u0)) * per_u
@@ -82,20 +84,20 @@ def spans(feet, grid, hidden=None):
     step = CHUNK // 2
     for first in range(0, len(feet), step):
         part = slice(first, first + step)
-        i0, i1 = column(feet.u_lo[part], -1), column(feet.u_hi[part], 1)
-        some = np.flatnonzero(i0 <= i1)
-        i0, i1 = i0.take(some), i1.take(some)
+        some = np.flatnonzero((feet.v_hi[part] >= v_lo) & (feet.v_lo[part] <= v_hi))
         some += first
+        i0, i1 = column(feet.u_lo.take(some), -1), column(feet.u_hi.take(some), 1)
         j0, j1 = row(feet.v_lo.take(some), -1), row(feet.v_hi.take(some), 1)
-        keep = np.flatnonzero(j0 <= j1)
-        some, i0, i1, j0, j1 = (c.take(keep) for c in (some, i0, i1, j0, j1))
-        if hidden is not None and len(some):
-            keep = np.flatnonzero(~hidden(some, *(c.astype(np.int32) for c in (i0, i1, j0, j1))))
+        keep = np.flatnonzero((i0 <= i1) & (j0 <= j1))
+        some, i0, i1 = some.take(keep), i0.take(keep), i1.take(keep)
+        j0, j1 = j0.take(keep).astype(np.int32), j1.take(keep).astype(np.int32)
+        mask = hidden(some, i0, i1, j0, j1) if hidden is not None and len(some) else None
+        if mask is not None:
+            keep = np.flatnonzero(~mask)
             some, i0, i1, j0, j1 = (c.take(keep) for c in (some, i0, i1, j0, j1))
-        j0 = j0.astype(np.int32)
-        for a, b in _pieces((j1.astype(np.int32) - j0 + 1), CHUNK // 4):
-            height = j1[a:b].astype(np.int32) - j0[a:b] + 1
-            which, j = _expand(height, j0[a:b])
+        heights = j1 - j0 + 1
+        for a, b in _pieces(heights, CHUNK // 4):
+            which, j = _expand(heights[a:b], j0[a:b])
             which += a
             foot = some.take(which)
             v = (j * one(grid.dv) + one(grid.v0)).astype(np.float32)

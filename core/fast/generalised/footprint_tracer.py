@@ -144,10 +144,10 @@ class FootprintTracer(Whitted):
         pair, t, u, v, detail = structure.primitives.intersect(rays, np.arange(rays.n), item[usable], rays.t_max)
         order = np.argsort(pair, kind="stable")
         pair, t, u, v, detail = (a[order] for a in (pair, t, u, v, detail))
-        rays, found = rays.take(pair), usable[pair]
+        found = usable[pair]
         names = ("object", "primitive", "part", "normal", "point", "error")
-        hits = dict(zip(names, structure.primitives.surface(rays, item[found], t, u, v, detail)))
-        return found, {"t": rays.callers_t(t), "u": u, "v": v} | hits
+        hits = dict(zip(names, structure.primitives.surface(rays, pair, item[found], t, u, v, detail)))
+        return found, {"t": rays.callers_t(t, pair), "u": u, "v": v} | hits
 
     def _count_cones(self, wave, which, hit, n_it, n_ts):
         """Add cones to the tally."""

@@ -9,8 +9,8 @@ A kind is one file with one class. Its objects hold n primitives of the kind as 
 ``intersect(rays, ray, item, t_far)``
     Nearest hits of pairs (numbers of rays, numbers of primitives) with rays.t_min <= t <= t_far[ray]: arrays
     (pair, t, u, v, detail), one entry for each pair that hits; `pair` indexes the pairs.
-``surface(rays, item, t, u, v, detail)``
-    What is there, for one hit a ray: object, primitive, part, normal, point, error, as in :class:`~rayscope.core.hits.Hits`.
+``surface(rays, ray, item, t, u, v, detail)``
+    What is there, for one hit of each of some rays: object, primitive, part, normal, point, error, as in :class:`~rayscope.core.hits.Hits`.
 ``overlaps(item, lo, hi)``
     Bool per pair: whether the primitive reaches into the box; conservative: touching counts.
 ``clip(item, lo, hi)``
@@ -111,14 +111,14 @@ class Primitives:
             pairs.append(pair if isinstance(at, slice) else at[pair])
         return np.concatenate(pairs)
 
-    def surface(self, rays, item, t, u, v, detail):
+    def surface(self, rays, ray, item, t, u, v, detail):
         """What is at the hits: object, primitive, part, normal, point, error."""
         if len(self.kinds) == 1:
-            return self.kinds[0].surface(rays, item, t, u, v, detail)
+            return self.kinds[0].surface(rays, ray, item, t, u, v, detail)
         n = len(item)
         columns = (np.zeros(n, np.int32), np.zeros(n, np.int64), np.zeros(n, np.int32), np.zeros((n, 3)), np.zeros((n, 3)), np.zeros(n))
         for kind, at, own in self._by_kind(item):
-            for column, value in zip(columns, kind.surface(rays.take(at), own, t[at], u[at], v[at], detail[at])):
+            for column, value in zip(columns, kind.surface(rays, ray[at], own, t[at], u[at], v[at], detail[at])):
                 column[at] = value
         return columns
 

@@ -32,7 +32,7 @@ class ClosedMesh:
         """Where lines enter and leave; as of other solids."""
         from ..rays import Rays
         m = len(ray)
-        lines = Rays(rays.o[:, ray], rays.d[:, ray], np.full(m, -np.inf), np.full(m, np.inf), np.zeros(m, np.int64))
+        lines = Rays(rays.o[:, ray], rays.d[:, ray], np.full(m, -np.inf), np.full(m, np.inf), np.ones(m))
         every = _All(self.index.primitives, lines)
         self.index.traverse(lines, every)
         line, triangle, t = (np.concatenate(c) if c else np.zeros(0, kind) for c, kind in
@@ -83,9 +83,9 @@ class ClosedMesh:
         out_u[pair], out_v[pair] = u, v
         return out_u, out_v
 
-    def surface(self, rays, item, t, u, v, triangle):
+    def surface(self, rays, ray, item, t, u, v, triangle):
         """What is there; as of triangles."""
-        return self.triangles.surface(rays, triangle, t, u, v, item)
+        return self.triangles.surface(rays, ray, triangle, t, u, v, item)
 
     def support(self, item, axis):
         """Exact extents (d, D) along directions."""

@@ -261,13 +261,13 @@ class Trees:
         """The pairs that hit."""
         return self._nearest(rays, ray, item, t_far)[0]
 
-    def surface(self, rays, item, t, u, v, number):
+    def surface(self, rays, ray, item, t, u, v, number):
         """Object, primitive, part, normal, point and error of hits, one a ray. Parts are leaves, from left to right."""
         n = len(item)
         normal, point, error = np.zeros((n, 3)), np.zeros((n, 3)), np.zeros(n)
         face = number & FACE
         for kind, at, own in self.leaves.by_kind(self._leaf_of(item, number)):
-            normal[at], point[at], error[at] = kind.surface(rays.take(at), own, t[at], u[at], v[at], face[at])[3:]
+            normal[at], point[at], error[at] = kind.surface(rays, ray[at], own, t[at], u[at], v[at], face[at])[3:]
         normal[(number >> TURNED & 1) == 1] *= -1.0
         return self.object_of[item], self.primitive_of[item], (number >> LEAF).astype(np.int32), normal, point, error
 

@@ -94,7 +94,7 @@ class Instances:
         found = [[np.zeros(0, np.int64)], [np.zeros(0)], [np.zeros(0)], [np.zeros(0)], [np.zeros(0, np.int64)]]
         for pair, own, query in self._ask(Closest, rays, ray, item, t_far, counts):
             hit = np.flatnonzero(query.item >= 0)
-            values = pair[hit], own.callers_t(query.t)[hit], query.u[hit], query.v[hit], query.item[hit]
+            values = pair[hit], own.callers_t(query.t[hit], hit), query.u[hit], query.v[hit], query.item[hit]
             for column, value in zip(found, values):
                 column.append(value)
         return [np.concatenate(c) for c in found]
@@ -104,7 +104,7 @@ class Instances:
         blocked = [pair[query.blocked] for pair, _, query in self._ask(Occluded, rays, ray, item, t_far, counts)]
         return np.concatenate([np.zeros(0, np.int64), *blocked])
 
-    def surface(self, rays, item, t, u, v, detail):
+    def surface(self, rays, ray, item, t, u, v, detail):
         """Object, primitive, part, normal, point and error of hits."""
         n = len(item)
         rows, primitive = np.empty((9, n)), np.empty(n, np.int64)

@@ -160,10 +160,10 @@ class Polygons:
         """The pairs that hit."""
         return self._hits(rays, ray, item, t_far)[0]
 
-    def surface(self, rays, item, t, u, v, detail):
+    def surface(self, rays, ray, item, t, u, v, detail):
         """Object, primitive, part, normal, point and error of hits, one a ray."""
         normal, anchor = self.corners.normal[:, item], self.corners.anchor[:, item]
-        p = rays.o + t * rays.d
+        p = rays.o[:, ray] + t * rays.d[:, ray]
         p = p - normal * dot(normal, p - anchor)
         # Not beyond the polygon's box, where the ray met it edge-on.
         point = np.minimum(np.maximum(p.T, self.lo[item]), self.hi[item])

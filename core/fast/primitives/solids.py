@@ -190,9 +190,9 @@ class UnitShapes:
         t, face = (np.stack([first.take(pair), second.take(pair)], axis=1).ravel() for first, second in ((t_in, t_out), (face_in, face_out)))
         return np.repeat(pair, 2), t, face, np.tile([True, False], len(pair))
 
-    def surface(self, rays, item, t, u, v, face):
+    def surface(self, rays, ray, item, t, u, v, face):
         """Object, primitive, part, normal, point and error of hits, one a ray."""
-        o, d = self._to_unit(rays, np.arange(len(item)), item)
+        o, d = self._to_unit(rays, ray, item)
         p = self.project(o + t * d, face, item)
         m, w, origin = self.matrix[:, :, item], self.inverse[:, :, item], self.origin[:, item]
         q = np.stack([m[r, 0] * p[0] + m[r, 1] * p[1] + m[r, 2] * p[2] for r in range(3)])

@@ -89,22 +89,24 @@ class Triangles:
 
     def _hits(self, rays, ray, item, t_far):
         """As :meth:`intersect`, all pairs at once."""
-        axes, origin, s = rays.shear
+        main = rays.main or rays.main_of(ray)
+        if main is not None:
+            # One order of the axes: whole triangles are fetched at once, and the shear is cheaper made anew.
+            dx, dy, dz = (rays.d[k].take(ray) for k in main)
+            sx, sy, sz = dx / dz, dy / dz, 1.0 / dz
+            ox, oy, oz = (rays.apex[k] for k in main) if rays.apex is not None else (rays.o[k].take(ray) for k in main)
+            corners = self._flat.reshape(-1, 9).take(item, axis=0).T
+            corners = [corners[k + vertex] for vertex in (0, 3, 6) for k in main]
+        else:
+            axes, origin, s = rays.shear
+            sx, sy, sz = (c.take(ray) for c in s)
+            ox, oy, oz = (origin[a].take(ray) for a in range(3))
+            places = [axes[a].take(ray) + item * 9 for a in range(3)]
+            corners = [self._flat.take(place + vertex) for vertex in (0, 3, 6) for place in places]
         x, y, z = [], [], []
-        sx, sy = s[0].take(ray), s[1].take(ray)
-        ox, oy, oz = (origin[a].take(ray) for a in range(3))
-        first = item * 9
-        places = [first + k for k in rays.main] if rays.main is not None else [axes[a].take(ray) + first for a in range(3)]
-        flat = self._flat
         for vertex in (0, 3, 6):
-            kx, ky, kz = (place + vertex for place in places) if vertex else places
-            w = flat.take(kz)
-            w -= oz
-            p = flat.take(kx)
-            p -= ox
+            p, q, w = (corner - o for corner, o in zip(corners[vertex:], (ox, oy, oz)))
             p -= sx * w
-            q = flat.take(ky)
-            q -= oy
             q -= sy * w
             x.append(p)
             y.append(q)
@@ -116,7 +118,7 @@ class Triangles:
         pair = np.flatnonzero((np.minimum(np.minimum(u, v), w) >= 0.0) | (np.maximum(np.maximum(u, v), w) <= 0.0))
         hit_ray = ray
         if len(pair) < len(ray):
-            u, v, w, hit_ray = u.take(pair), v.take(pair), w.take(pair), ray.take(pair)
+            u, v, w, sz, hit_ray = u.take(pair), v.take(pair), w.take(pair), sz.take(pair), ray.take(pair)
             x, y, z = ([column.take(pair) for column in axis] for axis in (x, y, z))
         det = u + v + w
         # Seen edge-on, or hardly a triangle: the edge functions are little but rounding errors.
@@ -137,7 +139,6 @@ class Triangles:
             exact = edge_functions(p, q, lambda i: self.xyz[:, own[i]].reshape(3, 3).tolist())
             for column, value in zip((u, v, w, det), (*exact, exact[0] + exact[1] + exact[2])):
                 column[doubtful] = value
-        sz = s[2].take(hit_ray)
         with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
             t = (u * (sz * z[0]) + v * (sz * z[1]) + w * (sz * z[2])) / det
         good = np.flatnonzero((t >= rays.t_min.take(hit_ray)) & (t <= t_far.take(hit_ray)) & np.isfinite(t))
@@ -153,7 +154,7 @@ class Triangles:
             self._area[k] = -1 if collinear(*self.xyz[:, k].reshape(3, 3).tolist()) else 1
         return self._area.take(item) < 0
 
-    def surface(self, rays, item, t, u, v, detail):
+    def surface(self, rays, ray, item, t, u, v, detail):
         """Object, primitive, part, normal, point and error of hits."""
         rows = self.rows(item)
         flip = self.flip[item] if self.flips else None
