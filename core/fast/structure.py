@@ -110,10 +110,9 @@ class Structure:
             for first in range(0, len(everything), SURFACES):
                 found = everything[first:first + SURFACES]
                 at = number.take(found)
-                batch = query.rays.take(found)
                 t, u, v = query.t.take(found), query.u.take(found), query.v.take(found)
-                surface = self.primitives.surface(batch, query.item.take(found), t, u, v, query.detail.take(found))
-                hits.t[at] = batch.callers_t(t)
+                surface = self.primitives.surface(query.rays, found, query.item.take(found), t, u, v, query.detail.take(found))
+                hits.t[at] = query.rays.callers_t(t, found)
                 hits.u[at], hits.v[at] = u, v
                 hits.object[at], hits.primitive[at], hits.part[at], normal, point, hits.error[at] = surface
                 for axis in range(3):                       # column by column, several times faster than rows at once
