@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from bl_ext.user_default.rayscope.addon.read import read_scene
+from bl_ext.user_default.rayscope.core import trace
 from bl_ext.user_default.rayscope.core.scene.layout import object_bounds
 from bl_ext.user_default.rayscope.core.scene.scene import Shapes
 from bl_ext.user_default.rayscope.core.scene.solids import flatten
@@ -34,6 +35,17 @@ def test_opens_and_reads_without_notices(name):
             f"{image.name} lies outside the file"
         )
     assert not bpy.data.libraries and not bpy.data.texts
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_directional_techniques_show_what_the_bvh_shows(name):
+    scene = read(name)
+    one = trace(scene, "bvh", size=(40, 30), depth=2)
+    other = trace(scene, "bvh", size=(40, 30), depth=2, primary="image-directory", shadow="light-buffer")
+    for image in ("object_index", "primitive_index", "depth"):
+        assert np.array_equal(one.passes[image], other.passes[image]), image
+    assert np.array_equal(one.image, other.image)
+    assert len(np.unique(one.passes["object_index"])) > 3
 
 
 def test_still_life():
