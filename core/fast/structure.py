@@ -64,8 +64,8 @@ class Structure:
         raise NotImplementedError
 
     def divide(self, rays):
-        """Divide a batch into those rays that are best traced together: (numbers, rays) each."""
-        return [(np.arange(rays.n), rays)]
+        """Divide a batch into those rays that are best traced together: (numbers, or a slice; rays) each."""
+        return [(slice(None), rays)]
 
     def for_light(self, light):
         """The structure to ask about shadow rays to one of the scene's lights: this one, unless it keeps something for each."""
@@ -153,7 +153,7 @@ class Structure:
             for some, part in self.divide(batch):
                 query = question(self.primitives, part, Counts(part.n) if count else None)
                 self.traverse(part, query)
-                number = index[start + some]
+                number = index[start:start + batch.n][some]
                 for name in counts:
                     counts[name][number] = getattr(query.counts, name)
                 parts.append((number, query))
