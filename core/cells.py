@@ -27,8 +27,6 @@ DIRECTIONS = tuple(
         (0.0, 1.0, -1.0),
     )
 )
-#: Positions along a cell that the sweep of a kd-tree tells apart.
-POSITIONS = 2**32
 #: Part of a cell's edge (of a grid), or of the root's longest edge (of a tree), by which cells overlap, so that a
 #: walk off by rounding errors meets every primitive all the same.
 GRID_OVERLAP, TREE_OVERLAP = 2.0**-20, 2.0**-30

@@ -12,8 +12,6 @@ from ...cells import REFERENCES_AT_LEAST, REFERENCES_PER_PRIMITIVE, limit_notice
 from ...hits import box_area
 from .lists import chunks, ranges
 
-#: References divided together: columns that stay in the cache, and progress that is told often.
-REFERENCES = 32_768
 #: Cells divided together where they are taken from a queue one by one.
 BATCH = 256
 
@@ -48,16 +46,32 @@ class Cells:
         """Some of the cells, given by ascending numbers."""
         if len(index) == len(self.count):
             return self
-        first = np.cumsum(self.count) - self.count
-        refs = ranges(first[index], self.count[index])
+        count, item, more = self.count.take(index), self.item, self.more
+        if count.sum() < len(item):
+            there = np.zeros(len(self.count), bool)
+            there[index] = True
+            refs = np.flatnonzero(np.repeat(there, self.count))
+            item, more = item.take(refs), tuple(a.take(refs, axis=0) for a in more)
         return Cells(
-            self.lo.take(index, axis=0),
-            self.hi.take(index, axis=0),
-            self.count.take(index),
-            self.item.take(refs),
-            tuple(a.take(refs, axis=0) for a in self.more),
-            self.level.take(index),
+            self.lo.take(index, axis=0), self.hi.take(index, axis=0), count, item, more, self.level.take(index)
         )
+
+    def part(self, some):
+        """The cells of a slice."""
+        first = int(self.count[: some.start].sum())
+        refs = slice(first, first + int(self.count[some].sum()))
+        return Cells(
+            self.lo[some],
+            self.hi[some],
+            self.count[some],
+            self.item[refs],
+            tuple(a[refs] for a in self.more),
+            self.level[some],
+        )
+
+    def contents(self, mask):
+        """What is in the cells of a mask: how many primitives in each, and which."""
+        return self.count[mask], self.item[np.repeat(mask, self.count)]
 
     @property
     def cell(self):
@@ -92,12 +106,12 @@ class Tree:
     item: list = field(default_factory=list)
     n: int = 0
 
-    def add(self, cells, level, parent):
+    def add(self, lo, hi, level, parent):
         """Add cells; their numbers."""
-        m = len(cells.count)
+        m = len(lo)
         for column, values in (
-            (self.lo, cells.lo),
-            (self.hi, cells.hi),
+            (self.lo, lo),
+            (self.hi, hi),
             (self.level, np.broadcast_to(level, m)),
             (self.parent, np.broadcast_to(parent, m)),
         ):
@@ -107,7 +121,7 @@ class Tree:
 
 
 def grow(
-    divide, root, arity, n, stop, max_depth, leaf_size, max_bytes, node_bytes, reference_bytes, progress, name, notices
+    divide, root, arity, n, stop, max_depth, leaf_size, max_bytes, node_bytes, reference_bytes, together, progress, name, notices
 ):
     """Grow a tree.
 
@@ -120,6 +134,8 @@ def grow(
     root : Cells
     n : int
         Primitives.
+    together : int
+        References divided together.
     stop : {"depth", "memory", "cost"}
         depth: a cell of more than `leaf_size` primitives is divided down to level `max_depth`. memory: so are the cells
         that a random ray tests most in, one after the other, until `max_bytes` are used. cost: as depth, but only where
@@ -129,7 +145,7 @@ def grow(
     -------
     Tree, with arrays for columns
     """
-    growth = _Growth(divide, arity, n, max_depth, leaf_size, progress, name, notices)
+    growth = _Growth(divide, arity, n, max_depth, leaf_size, together, progress, name, notices)
     if stop == "memory":
         growth.by_memory(root, max_bytes, node_bytes, reference_bytes)
     else:
@@ -138,29 +154,22 @@ def grow(
 
 
 class _Growth:
-    def __init__(self, divide, arity, n, max_depth, leaf_size, progress, name, notices):
+    def __init__(self, divide, arity, n, max_depth, leaf_size, together, progress, name, notices):
         self.divide, self.arity, self.n = divide, arity, n
-        self.max_depth, self.leaf_size, self.progress, self.name, self.notices = (
-            max_depth,
-            leaf_size,
-            progress,
-            name,
-            notices,
-        )
+        self.max_depth, self.leaf_size, self.together = max_depth, leaf_size, together
+        self.progress, self.name, self.notices = progress, name, notices
         self.limit = max(REFERENCES_AT_LEAST, REFERENCES_PER_PRIMITIVE * n)
         self.tree, self.divided, self.leaves = Tree(), [], []
 
     def by_level(self, root, by_cost):
         """Level by level, many cells together."""
-        cells, number, level = root, self.tree.add(root, 0, -1), 0
-        bad = np.zeros(1, np.int64)
-        settled = 0
+        number = self.tree.add(root.lo, root.hi, 0, -1)
+        cells, number, bad = self._large(root, number, np.zeros(1, np.int64), 0)
+        references, level = self.n, 0
         while len(number):
-            wanted = np.flatnonzero(cells.count > self.leaf_size) if level < self.max_depth else np.zeros(0, np.int64)
-            references, leaf, parts = settled + int(cells.count.sum()), np.ones(len(number), bool), []
-            for part in chunks(cells.count[wanted], REFERENCES):
-                own = wanted[part]
-                some, before = cells.take(own), bad[own]
+            parts = []
+            for part in chunks(cells.count, self.together):
+                some, before = cells.part(part), bad[part]
 
                 def worth(cost, some=some, before=before):
                     missed = cost >= some.count
@@ -172,23 +181,25 @@ class _Growth:
                 if by_cost:
                     good &= worth(cost)
                 good, references = self._guarded(good, references, some, children, level)
-                kept = np.flatnonzero(good)
-                leaf[own[kept]] = False
+                kept, own = np.flatnonzero(good), number[part]
+                self._leaves(own[~good], *some.contents(~good))
                 children = children.take((kept[:, None] * self.arity + np.arange(self.arity)).ravel())
-                parent = number[own[kept]]
-                below = self.tree.add(children, level + 1, np.repeat(parent, self.arity))
+                parent = own[kept]
+                below = self.tree.add(children.lo, children.hi, level + 1, np.repeat(parent, self.arity))
                 self.divided.append((parent, below[:: self.arity], plane[:, kept]))
-                misses = before + (cost >= some.count)
-                parts.append((children, below, np.repeat(misses[kept], self.arity)))
-                self.progress((level + part.stop / len(wanted)) / (self.max_depth + 1))
-            leaf = np.flatnonzero(leaf)
-            self._leaves(number[leaf], cells.take(leaf))
-            settled += int(cells.count[leaf].sum())
-            if not parts:
-                break
+                misses = np.repeat((before + (cost >= some.count))[kept], self.arity)
+                parts.append(self._large(children, below, misses, level + 1))
+                self.progress((level + part.stop / len(number)) / (self.max_depth + 1))
             cells = joined([c for c, _, _ in parts])
             number, bad = (np.concatenate(c) for c in list(zip(*parts))[1:])
             level += 1
+
+    def _large(self, cells, number, bad, level):
+        """Those of new cells that are to be divided, with their numbers and what `bad` says; the others are leaves."""
+        large = (cells.count > self.leaf_size) & (level < self.max_depth)
+        self._leaves(number[~large], *cells.contents(~large))
+        large = np.flatnonzero(large)
+        return cells.take(large), number[large], bad[large]
 
     def _guarded(self, good, references, some, children, level):
         """Divide no more cells once there are too many references; which are divided, and references then."""
@@ -206,7 +217,7 @@ class _Growth:
     def by_memory(self, root, max_bytes, node_bytes, reference_bytes):
         """One cell after the other, the one first in which a random ray tests most."""
         tree, ready, queue = self.tree, {}, []
-        number = tree.add(root, 0, -1)
+        number = tree.add(root.lo, root.hi, 0, -1)
         used, references = node_bytes + reference_bytes * int(root.count[0]), int(root.count[0])
         contents = {}
 
@@ -242,15 +253,15 @@ class _Growth:
             more = int(children.count.sum() - contents.pop(cell).count[0])
             used += self.arity * node_bytes + more * reference_bytes
             references += more
-            number = tree.add(children, level + 1, cell)
+            number = tree.add(children.lo, children.hi, level + 1, cell)
             self.divided.append((np.array([cell]), number[:1], plane))
             offer(number, children, level + 1)
             self.progress(min(1.0, used / max_bytes))
         for cell, cells in contents.items():
-            self._leaves(np.array([cell]), cells)
+            self._leaves(np.array([cell]), cells.count, cells.item)
 
-    def _leaves(self, number, cells):
-        self.leaves.append((number, cells.count, cells.item))
+    def _leaves(self, number, count, item):
+        self.leaves.append((number, count, item))
 
     def finished(self):
         """The tree with arrays for columns."""

@@ -37,6 +37,8 @@ class CellTree(Structure):
     ARITY = 2
     #: Bytes of a cell that a subclass adds.
     MORE_BYTES = 0
+    #: References divided together: columns that stay in the cache, and progress that is told often.
+    TOGETHER = 32_768
 
     def lay_out(self):
         """The root: the box around everything, larger by the margin; a flat one gets depth on one side."""
@@ -69,6 +71,7 @@ class CellTree(Structure):
             max_bytes,
             NODE_BYTES + more,
             REFERENCE_BYTES,
+            self.TOGETHER,
             tell,
             self.NAME,
             self.notices,
