@@ -298,7 +298,7 @@ def technique(name):
     return _BY_NAME[name]
 
 
-def build(scene, name="bvh", core="fast", progress=None, **parameters):
+def build(scene, name="bvh", core="fast", progress=None, beside=None, **parameters):
     """Build one technique over a scene.
 
     Parameters
@@ -310,6 +310,8 @@ def build(scene, name="bvh", core="fast", progress=None, **parameters):
     progress : callable, optional
         Called as ``progress(fraction)`` now and then; it stops the build by raising
         :class:`~rayscope.core.errors.Cancelled`.
+    beside : structure, optional
+        One over the same scene, in the same core: what both need is taken from it.
     **parameters
         The technique's own.
 
@@ -331,6 +333,9 @@ def build(scene, name="bvh", core="fast", progress=None, **parameters):
     values = resolve(name, row.parameters, parameters, core)
     structure = row.load(core)
     start = time.perf_counter()
-    index = structure.over(scene, row, values, progress)
+    if beside is None:
+        index = structure.over(scene, row, values, progress)
+    else:
+        index = structure.beside(beside, row, values, progress)
     index.figures["T_B"] = time.perf_counter() - start
     return index

@@ -37,9 +37,20 @@ class HandingOver:
         return index
 
     @classmethod
+    def beside(cls, other, row, parameters, progress=None):
+        if other.technique.name != SECOND or other.parameters != cls._second_parameters():
+            return super().beside(other, row, parameters, progress)
+        index = cls(other.primitives, parameters, progress, other.scene)
+        index.technique, index._second = row, other
+        return index
+
+    @classmethod
+    def _second_parameters(cls):
+        return resolve(SECOND, technique(SECOND).parameters, {}, cls.core)
+
+    @classmethod
     def _second_over(cls, primitives, progress=None):
-        row = technique(SECOND)
-        return row.load(cls.core)(primitives, resolve(SECOND, row.parameters, {}, cls.core), progress)
+        return technique(SECOND).load(cls.core)(primitives, cls._second_parameters(), progress)
 
     @property
     def second(self):

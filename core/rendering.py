@@ -6,6 +6,7 @@ Pictures are arrays whose row 0 is at the bottom, as in Blender.
 import math
 import time
 from dataclasses import dataclass, field
+from functools import partial
 from importlib import import_module
 
 import numpy as np
@@ -258,6 +259,7 @@ class Rendering:
         self.region = _check_region(region, self.size)
         names = [name for name in PASSES if self.count or name not in COUNTED_PASSES]
         self._progress, self._fraction, self._told = progress, 0.0, -math.inf
+        self._standard, self._contenders = None, {}     # what an automatic choice starts from, and what it is not sure of
         wanted = self._wanted(technique, parameters, primary, shadow, secondary, index, values["depth"])
         passes = _framebuffer(self.size, names)
         self.result = Result(passes["combined"], passes, notices=_notices(scene))
@@ -336,26 +338,47 @@ class Rendering:
         if kinds:
             from .lab.needs import resolve_automatic
 
-            chosen = resolve_automatic(self.scene, self.size, self.samples, depth, self.core, kinds)
-        return {kind: (chosen.get(kind, STANDARD), {}) for kind in open_kinds}
+            self._standard = build(self.scene, STANDARD, self.core, progress=self._building)
+            x0, y0, x1, y1 = self.region
+            chosen = resolve_automatic(
+                self.scene, self._standard, (x1 - x0, y1 - y0), self.samples, depth, self.core, kinds
+            )
+            if self.core == "fast" and not self.count:              # counters are those of one technique
+                self._contenders = {kind: names for kind, names in chosen.items() if len(names) > 1}
+        return {kind: (chosen.get(kind, (STANDARD,))[0], {}) for kind in open_kinds}
 
     def _build(self, wanted, index):
         """Build every different structure once."""
-        built = {}
+        built, standard = {}, self._standard
+        if standard is not None:
+            built[STANDARD, tuple(sorted(standard.parameters.items()))] = standard
         keys = {
             kind: None if choice is None else (choice[0], tuple(sorted(choice[1].items())))
             for kind, choice in wanted.items()
         }
-        todo = list(dict.fromkeys(k for k in keys.values() if k is not None))
+        others = {
+            kind: [
+                (name, tuple(sorted(resolve(name, technique_row(name).parameters, {}, self.core).items())))
+                for name in names[1:]
+            ]
+            for kind, names in self._contenders.items()
+        }
+        every = dict.fromkeys([*keys.values(), *(key for some in others.values() for key in some)])
+        todo = [key for key in every if key is not None and key not in built]
         for i, key in enumerate(todo):
-
-            def report(fraction, i=i):
-                self._fraction = BUILDING * (i + fraction) / len(todo)
-                self._check()
-
-            built[key] = build(self.scene, key[0], self.core, progress=report, **dict(key[1]))
+            report = partial(self._building, done=i, of=len(todo))
+            built[key] = build(self.scene, key[0], self.core, progress=report, beside=standard, **dict(key[1]))
         self.result.structures = {kind: index if key is None else built[key] for kind, key in keys.items()}
+        for kind, some in others.items():
+            from .contest import Contest
+
+            self.result.structures[kind] = Contest([self.result.structures[kind], *(built[key] for key in some)])
         self.result.figures["T_B"] = sum(s.figures["T_B"] for s in built.values())
+
+    def _building(self, fraction, done=0, of=1):
+        """The progress of a build."""
+        self._fraction = BUILDING * (done + fraction) / of
+        self._check()
 
     def _check(self):
         """Tell the progress, if it is time to."""
@@ -388,6 +411,8 @@ class Rendering:
             self.result.cancelled = not done
             self._figures(began)
         # Some is known only now.
+        for kind in self._contenders:
+            self.result.structures[kind] = self.result.structures[kind].leader
         self.result.notices += [n for n in self._tracer.notices if n not in self.result.notices]
 
     def _sampled(self, order):

@@ -1,6 +1,7 @@
 """What all structures of the numpy core share: building over a scene, and answering batches of rays."""
 
 import math
+from copy import copy
 
 import numpy as np
 
@@ -53,6 +54,16 @@ class Structure:
         primitives = Primitives.of(scene, lambda geometry: cls(geometry, parameters, progress))
         index = cls(primitives, parameters, progress)
         index.scene, index.technique = scene, row
+        return index
+
+    @classmethod
+    def beside(cls, other, row, parameters, progress=None):
+        """Build over the scene of another structure, whose primitives are used again; inside instances each technique has
+        structures of its own."""
+        if other.primitives.structures():
+            return cls.over(other.scene, row, parameters, progress)
+        index = cls(copy(other.primitives), parameters, progress)
+        index.scene, index.technique = other.scene, row
         return index
 
     def build(self, progress, **parameters):

@@ -1,11 +1,15 @@
 """What a picture needs, what it does without, and which technique suits each kind of ray.
 
-The scene is looked at once: numbers, kinds, and a sample of the primitives. What every technique would cost then comes
-from a model: N_IT and N_TS per ray as powers of the number of primitives and of how unevenly they are spread, and the
-nanoseconds of each. Both are fitted on small scenes on the machine at hand, once a process and core
-(:func:`calibration`, under a second), not taken from a table.
+STANDARD, the bvh, is built in any case: its build is among the shortest, and other techniques hand rays over to it. The
+scene is then looked at once, through the primitives that this build has made: how many of them, of their boxes and of
+the bvh's a line through the scene meets, how many cells of a grid, and how crowded these are (:func:`survey`).
+
+What every technique would cost comes from a model: its N_IT and N_TS are in proportion to whichever of these measures
+they follow best, and each has its nanoseconds. All is fitted on small scenes on the machine at hand, once a process and
+core (:func:`calibration`, under a second), not taken from a table.
 """
 
+import functools
 import itertools
 import math
 import time
@@ -16,36 +20,44 @@ from pathlib import Path
 import numpy as np
 
 from ..catalogue import build, technique, techniques
+from ..cells import cells_along
 from ..errors import RayscopeError
 from ..options import AUTOMATIC, STANDARD
+from ..parameters import resolve
 from ..scene.camera import Camera
-from ..scene.layout import Layout, to_world
 from ..scene.light import Light
-from ..scene.scene import Mesh, Scene
+from ..scene.scene import Scene
 from . import report
 from .rays import ray_sets
 
 KINDS = ("primary", "secondary", "shadow")
-#: Primitives that are looked at, at most.
-SAMPLE = 2000
-#: Solids whose places are looked at, at most, about: one takes as long as a hundred vertices; and a tenth as many boxes.
-FEW = 120
-#: Scenes that the model is fitted on: number of primitives, and whether they are spread unevenly.
-SCENES = {"fast": ((40, False), (700, False), (250, True)), "pure": ((16, False), (150, False), (60, True))}
+#: Primitives of a level that are looked at, at most, about; and meshes of instances.
+SAMPLE, MESHES = 1000, 4
+#: Numbers of cells.
+NUMBERS = 65_521
+#: Scenes that the model is fitted on: number of triangles, length of their sides in those of triangles that just cover a
+#: sphere, and how much they are drawn from it to its middle. Counts follow from all, times from the first.
+SCENES = {"fast": ((150, 4.0, 0.0), (800, 1.0, 0.0), (60, 1.0, 0.0), (300, 0.3, 4.0), (200, 0.2, 8.0)),
+          "pure": ((40, 4.0, 0.0), (150, 1.0, 0.0), (16, 1.0, 0.0), (60, 0.3, 4.0), (50, 0.2, 8.0))}
+TIMED = 2
 #: Rays of each kind: numpy's calls cost the same for few rays as for many, so the seconds of a ray are those by which
 #: more rays take longer than fewer.
-RAYS = {"fast": (1000, 100), "pure": (40, 8)}
+RAYS = {"fast": (1000, 100), "pure": (24, 8)}
 #: Rays that are traced together, about, as the tracers have it.
 WAVE = 65_536
 #: A batch with more tests than this is not run: the smaller one has to do.
 TESTS = 90_000
-#: A technique whose time per ray is wrong by more than this factor on a scene that it was fitted on is no candidate:
+#: A technique whose time per ray is wrong by more than this factor on the scenes that it was fitted on is no candidate:
 #: its time does not follow from its counters.
 TRUST = 3.0
 #: Seconds of processor time after which no further technique is calibrated; those left are no candidates.
-BUDGET = 0.5
+BUDGET = 0.7
 #: The whole picture must be faster than with the standard technique by this part, as the model is not exact.
-MARGIN = 0.2
+MARGIN = 0.15
+#: What may be quicker by so much than the model has it is tried while the picture is traced: so many others for a kind of
+#: ray at most, if their builds together take no more than this part of the picture's time, and each no more than this part
+#: of the time of the rays.
+DOUBT, OTHERS, TRIED, REPAID = 2.5, 2, 0.04, 0.2
 #: Techniques estimated to take this many times as long as it are not traced to compare.
 HOPELESS = 8.0
 #: Pictures are repeated to compare them until all took so long together, seconds.
@@ -53,12 +65,56 @@ QUICK = 3.0
 #: Databases of :func:`benchmark`, with size factors that give some hundred primitives.
 DATABASES = {"balls": 2, "gears": 1, "jacks": 2, "lattice": 4, "mount": 4, "rings": 2, "teapot": 5, "tetra": 5, "tree": 7}
 #: Calibrated first: brute force tells what a test costs, which is the same for all.
-FIRST = ("brute", STANDARD, "grid", "light-buffer", "image-directory", "kd-tree", "octree")
+FIRST = ("brute", STANDARD, "image-directory", "light-buffer", "grid", "macro-grid")
 #: Bytes of a triangle in a structure, about: what copies of instances would take.
 TRIANGLE_BYTES = 250
 
 
 # --- looking at the scene ---------------------------------------------------------------------------------------------
+
+@dataclass
+class Measures:
+    """What a line through a scene meets, on average.
+
+    A line that crosses a box of surface A meets a smaller one in it, of surface a, with the probability a / A: so sums of
+    surfaces are numbers of boxes met.
+
+    Attributes
+    ----------
+    one : float
+        1: for what does not depend on the scene.
+    all : float
+        Primitives, each of which brute force tests.
+    pierced : float
+        Boxes of primitives that it meets, and the one that it ends on.
+    nodes : float
+        Boxes and primitives of the bvh: its c_SAH, and the levels down to the one that it ends on.
+    cells : float
+        Cells of a grid at its own density.
+    listed : float
+        Primitives listed in these cells: boxes of primitives, grown by a cell, that it meets, and what else is in the
+        cells of those that it ends on (`crowd`).
+    crowd : float
+        Primitives in the cell of the place where it ends: where a primitive's surface is large, it ends more often.
+    """
+
+    one: float = 1.0
+    all: float = 1.0
+    pierced: float = 1.0
+    nodes: float = 1.0
+    cells: float = 1.0
+    listed: float = 1.0
+    crowd: float = 1.0
+
+    def inside(self, inner):
+        """Of a scene of instances whose meshes have the measures `inner`: each instance met is a scene to cross."""
+        return Measures(1.0, self.all * (1.0 + inner.all), self.pierced * inner.pierced, self.nodes + self.pierced * inner.nodes,
+                        self.cells + self.listed * inner.cells, self.listed * (1.0 + inner.listed), max(self.crowd, inner.crowd))
+
+
+#: Those that counts may follow.
+FOLLOWED = ("one", "all", "pierced", "nodes", "cells", "listed")
+
 
 @dataclass
 class Survey:
@@ -68,24 +124,23 @@ class Survey:
     ----------
     n : int
         Primitives that a structure is built over at the top level, with those inside shared meshes.
-    clutter : float
-        Primitives that share a cell of a grid of about 4 n cells with a given one: 1 where they are spread evenly.
+    measures : Measures
     kinds : dict
         Kind of primitive -> number.
     copied : int
         Triangles that instances save.
     mirrors, glass, transparent, textures : list of str
         Materials.
-    lights : list of str
-        Lights that cast shadows.
+    lights, dark_lights : list of str
+        Lights that cast shadows, and others.
     coordinate, size : float
         Largest coordinate, and the diagonal of the scene's box.
-    seconds : float
-        What looking took.
+    seconds, build : float
+        What looking took, and what building STANDARD did.
     """
 
     n: int
-    clutter: float
+    measures: Measures
     kinds: dict
     copied: int
     mirrors: list
@@ -97,101 +152,108 @@ class Survey:
     coordinate: float
     size: float
     seconds: float = 0.0
+    build: float = 0.0
 
 
-def survey(scene):
+def survey(scene, index=None):
     """Look at a scene once.
+
+    Parameters
+    ----------
+    scene : Scene
+    index : structure, optional
+        STANDARD over it, of either core; built if absent.
 
     Returns
     -------
     Survey
     """
+    index = build(scene, STANDARD) if index is None else index
     began = time.perf_counter()
-    layout = Layout.of(scene.objects)
-    objects = scene.objects
-    kinds = {"triangle": sum(len(objects[i].geometry) for i in layout.meshes)}
-    for o in objects:
-        if not isinstance(o.geometry, Mesh):
-            for kind, number in Counter(s.kind for s in o.geometry.solids).items():
-                kinds[kind] = kinds.get(kind, 0) + number
-    kinds["instance"] = len(layout.instances)
-    shared = {id(objects[i].geometry): len(objects[i].geometry) for i in layout.instances}
-    copied = sum(len(objects[i].geometry) for i in layout.instances) - sum(shared.values())
-    kinds["triangle"] += sum(shared.values())
-    n = sum(kinds.values())
-    lo, hi = _bounds(objects)
-    there = bool((lo <= hi).all())
+    kinds, meshes = _contents(index)
+    measures, lo, hi = _measured_boxes(index)
+    if meshes:
+        measures = measures.inside(_mean([_measured_boxes(mesh)[0] for mesh, _ in meshes.most_common(MESHES)]))
+    inner = sum(mesh.figures["N"] for mesh in meshes)
+    kinds["triangle"] += inner
     materials = scene.used_materials()
-    lit = [light for light in scene.lights if any(light.colour)]
+    lit = {id(light): light.shadows and any(light.colour) for light in scene.lights}
     return Survey(
-        n, _clutter(scene, n, lo, hi) if there else 1.0, {k: v for k, v in kinds.items() if v}, copied,
+        index.figures["N"] + inner, measures, {k: v for k, v in kinds.items() if v},
+        sum(mesh.figures["N"] * number for mesh, number in meshes.items()) - inner,
         [m.name for m in materials if m.mirror or m.mirror_base], [m.name for m in materials if m.transmission],
         [m.name for m in materials if m.transparent], [m.name for m in materials if m.texture is not None],
-        [light.name for light in lit if light.shadows], [light.name for light in scene.lights if not (light.shadows and any(light.colour))],
-        float(np.abs([lo, hi]).max()) if there else 0.0, float(np.linalg.norm(hi - lo)) if there else 0.0, time.perf_counter() - began)
+        [light.name for light in scene.lights if lit[id(light)]], [light.name for light in scene.lights if not lit[id(light)]],
+        max(map(abs, (*lo, *hi))), math.dist(lo, hi), time.perf_counter() - began, index.figures.get("T_B", 0.0))
 
 
-def _place(solid):
-    """A point of a solid: its centre, a polygon's first corner; of a combination that of its first part."""
-    while hasattr(solid, "left"):
-        solid = solid.left
-    corners, m = solid.values.get("points"), solid.matrix.tolist()
-    x, y, z = (0.0, 0.0, 0.0) if corners is None else map(float, corners[0])
-    return [row[0] * x + row[1] * y + row[2] * z + row[3] for row in m[:3]]
+def _contents(index):
+    """Kind of primitive -> number; and structures inside instances -> number of instances."""
+    if isinstance(index.primitives, list):
+        return (Counter(p.KIND for p in index.primitives), Counter(p.inner for p in index.primitives if p.KIND == "instance"))
+    kinds = index.primitives.kinds
+    return (Counter({k.KIND: k.n for k in kinds}),
+            Counter({s: int(number) for k in kinds if k.KIND == "instance" for s, number in zip(k.structures, np.bincount(k.which))}))
 
 
-def _bounds(objects):
-    """World box, at a glance: of some vertices, used or not; scene.bounds() looks closer, and takes longer."""
-    lo, hi, known = np.full(3, np.inf), np.full(3, -np.inf), {}
-    for o in objects:
-        if not len(o.geometry):
-            continue
-        if id(o.geometry) not in known:
-            if isinstance(o.geometry, Mesh):
-                points = o.geometry.vertices[:: 1 + len(o.geometry.vertices) // (5 * SAMPLE)]
-                ends = np.fmin.reduce(points), np.fmax.reduce(points)
-            else:
-                from ..scene.solids import bounds
-                some = o.geometry.solids[:: 1 + len(o.geometry) // FEW]
-                points = np.array([_place(s) for s in some] + [end for s in some[:: 1 + 10 * len(some) // FEW] for end in bounds(s)])
-                ends = points.min(axis=0), points.max(axis=0)
-            known[id(o.geometry)] = np.array([[ends[i >> k & 1][k] for k in range(3)] for i in range(8)])
-        corners = to_world(o.matrix, known[id(o.geometry)])
-        corners = corners[np.isfinite(corners).all(axis=1)]
-        if len(corners):
-            lo, hi = np.minimum(lo, corners.min(axis=0)), np.maximum(hi, corners.max(axis=0))
-    return lo, hi
-
-
-def _clutter(scene, n, lo, hi):
-    """How many primitives share a cell, from a sample of their first corners."""
-    filled = [o for o in scene.objects if len(o.geometry)]
-    counts = np.array([len(o.geometry) for o in filled])
-    if counts.sum() < 2:
-        return 1.0
-    # Evenly spaced primitives of all, object by object: no random numbers, so that the same scene gives the same answer.
-    solid = sum(not isinstance(o.geometry, Mesh) for o in filled) > len(filled) // 2
-    at = np.linspace(0, counts.sum() - 1, min(FEW if solid else SAMPLE, int(counts.sum()))).astype(int)
-    ends = np.cumsum(counts)
-    which = np.searchsorted(ends, at, side="right")
-    points = []
-    for i in which[np.diff(which, prepend=-1) > 0]:
-        own, o = at[which == i] - (ends[i] - counts[i]), filled[i]
-        if isinstance(o.geometry, Mesh):
-            points.append(to_world(o.matrix, o.geometry.vertices[o.geometry.triangles[own, 0]]))
-        else:
-            points.append(to_world(o.matrix, np.array([_place(o.geometry.solids[k]) for k in own])))
-    points = np.concatenate(points)
-    points = points[np.isfinite(points).all(axis=1)]
-    extent = np.where(hi > lo, hi - lo, 1.0)
-    cells = max(1, int((4.0 * n) ** (1.0 / 3.0)))
+def _measured_boxes(index):
+    """The measures of one level, and its box."""
+    p, n = index.primitives, index.figures["N"]
+    if not n:
+        return Measures(), (0.0,) * 3, (0.0,) * 3
+    some = slice(None, None, 1 + n // SAMPLE)
+    if isinstance(p, list):
+        lo, hi = np.array([[q.lo for q in p], [q.hi for q in p]])
+    else:
+        lo, hi = p.lo, p.hi
+    if n > SAMPLE:                                                          # ten times as fast as by rows
+        first, last = np.array([column.min() for column in lo.T]), np.array([column.max() for column in hi.T])
+    else:
+        first, last = lo.min(axis=0), hi.max(axis=0)
+    size = last - first
+    scale = float(size.max()) or 1.0
+    lo, edge = (lo[some] - first) / scale, (hi[some] - lo[some]) / scale
+    size = size / scale
+    resolution = np.array(cells_along(size.tolist(), n, **_grid_rule()))
+    width = size / resolution
+    weight = n / len(lo)
+    box = _half_area(size)
+    if not box > 0.0:                                                       # all on one line: every line meets all
+        return Measures(all=n, pierced=n, nodes=2.0 * n, listed=n, crowd=n), first.tolist(), last.tolist()
+    area = _half_area(edge.T)
+    if len(lo) == n:
+        pierced = float(area.sum() / box)
+    else:                                   # a sample may miss the few large ones: of leaves, for c_GS counts inner nodes twice
+        pierced = 2.0 * index.figures["c_SAH"] - index.figures["c_GS"]
+    # How many primitives have their middle in the same cell; cells that share a number are few, and far apart.
     with np.errstate(all="ignore"):
-        index = np.clip(np.nan_to_num((points - lo) / extent * cells), 0, cells - 1).astype(np.int64)
-    # Not np.unique: the first call of that imports numpy.ma, which takes longer than all the rest.
-    sorted_ = np.sort(index @ np.array([cells * cells, cells, 1]))
-    each = np.diff(np.flatnonzero(np.diff(sorted_)) + 1, prepend=0, append=len(sorted_))
-    m = len(points)
-    return max(1.0, n * float((each * (each - 1)).sum()) / max(m * (m - 1), 1))
+        cell = np.minimum(((lo + 0.5 * edge) / np.where(width > 0.0, width, 1.0)).astype(np.int64), resolution - 1)
+    cell = cell @ (resolution[1] * resolution[2], resolution[2], 1) % NUMBERS
+    seen = area + 1e-12
+    crowd = 1.0 + weight * (float((seen * np.bincount(cell)[cell]).sum() / seen.sum()) - 1.0)
+    grown = pierced + float(weight * (_half_area((edge + width).T) - area).sum() / box)
+    x, y, z = size
+    planes = resolution[0] * y * z + resolution[1] * z * x + resolution[2] * x * y
+    return (Measures(1.0, n, pierced + 1.0, index.figures["c_SAH"] + math.log2(n + 1.0), float(planes / box), grown + crowd, crowd),
+            first.tolist(), last.tolist())
+
+
+def _half_area(edges):
+    """Half the surface of boxes with these edges, given as three columns."""
+    x, y, z = edges
+    return x * y + y * z + z * x
+
+
+@functools.cache
+def _grid_rule():
+    """How many cells a grid has, as :func:`cells_along` wants to know it."""
+    values = resolve("grid", technique("grid").parameters, {}, "fast")
+    return {name: values[name] for name in ("rule", "density", "resolution")}
+
+
+def _mean(some):
+    """The mean of Measures."""
+    return Measures(*(sum(values) / len(some) for values in zip(*(vars(m).values() for m in some))))
 
 
 # --- the model --------------------------------------------------------------------------------------------------------
@@ -204,16 +266,20 @@ class Model:
     ----------
     build : tuple of 2 float
         log T_B = a + b log n.
-    lazy : tuple of 2 float
-        The same for what is made when the first rays come; for each light, if only shadow rays are served.
     counts : dict
-        (kind of ray, "n_it" or "n_ts") -> how it grows, see `_growth`.
+        (kind of ray, "n_it" or "n_ts") -> (measure, factor): the count is the factor times this measure of the scene.
     ns : tuple of 3 float
         Seconds of a ray, of a test, of a step.
+    lazy : tuple of 2 float
+        As `build`, for what is made when the first rays come; for each light, if only shadow rays are served.
+    lights : bool
+        Whether that is so.
     shading : float
         Seconds for each ray that a picture takes besides, whatever the technique; known of STANDARD.
     wave : float
         Seconds of a batch of rays, however few.
+    off : float
+        The factor by which the seconds of a ray were wrong: root of the mean square of its logarithm.
     """
 
     build: tuple
@@ -223,23 +289,18 @@ class Model:
     lights: bool = False
     shading: float = 0.0
     wave: float = 0.0
+    off: float = 1.0
 
     def build_seconds(self, n, lights=1):
         """Time to build over n primitives, for some lights."""
         eager, lazy = (math.exp(a + b * math.log(n + 1.0)) for a, b in (self.build, self.lazy))
         return eager + lazy * (lights if self.lights else 1)
 
-    def per_ray(self, kind, n, clutter):
+    def per_ray(self, kind, measures):
         """N_IT, N_TS and seconds of a ray."""
         own = kind if (kind, "n_it") in self.counts else next(iter(self.counts))[0]     # none was there to be measured
-        n_it, n_ts = (self._count(self.counts[own, c], n, clutter) for c in ("n_it", "n_ts"))
+        n_it, n_ts = (factor * getattr(measures, measure) for measure, factor in (self.counts[own, c] for c in ("n_it", "n_ts")))
         return n_it, n_ts, self.ns[0] + self.ns[1] * n_it + self.ns[2] * n_ts
-
-    @staticmethod
-    def _count(growth, n, clutter):
-        a, b, c, tree = growth
-        linear = a + b * math.log(n + 1.0)
-        return max((linear if tree else math.exp(min(linear, 40.0))) * clutter**c - 1.0, 0.0)
 
 
 _known = {}
@@ -256,21 +317,27 @@ def calibration(core="fast"):
         What it took.
     """
     if core not in _known:
-        began, cpu, models = time.perf_counter(), time.process_time(), {}
-        scenes = [_lit((_uneven if uneven else _even)(n)) for n, uneven in SCENES[core]]
+        began, models, spent = time.perf_counter(), {}, 0.0
+        scenes = [_lit(_triangles(*row), row[-1]) for row in SCENES[core]]
+        standard = [build(scene, STANDARD, core) for scene in scenes]
         sets = [ray_sets(scene, build(scene, STANDARD), RAYS[core][0], 0) for scene in scenes]
-        looked = [survey(scene) for scene in scenes]
+        looked = [survey(scene, index) for scene, index in zip(scenes, standard)]
         # What traces more than rays makes other pictures, and its rays are those of another technique.
         own = [row.name for row in techniques() if row.family not in ("peers", "generalised") and core in row.cores]
         for name in sorted(own, key=lambda name: (name not in FIRST, FIRST.index(name) if name in FIRST else 0)):
-            if name in FIRST[:2] or time.process_time() - cpu < BUDGET:
+            if name in FIRST[:2] or spent < BUDGET:
                 technique(name).load(core)                              # importing is not building
-                model, off = _fit(name, core, scenes, looked, sets, models.get(FIRST[0]))
-                if off <= TRUST or name in FIRST[:2]:
-                    models[name] = model
+                start = time.thread_time()
+                models[name] = _fit(name, core, scenes, looked, sets, models.get(FIRST[0]))
+                spent += time.thread_time() - start
         models[STANDARD].shading = _shading(scenes[1], models[STANDARD], looked[1], core)
         _known[core] = models, time.perf_counter() - began
     return _known[core]
+
+
+def candidates(core="fast"):
+    """The models of those techniques whose time follows from their counters."""
+    return {name: model for name, model in calibration(core)[0].items() if model.off <= TRUST or name == STANDARD}
 
 
 def _shading(scene, model, seen, core):
@@ -283,103 +350,99 @@ def _shading(scene, model, seen, core):
         pass
     seconds = time.thread_time() - start
     rays = {kind: row["rays"] for kind, row in rendering.result.figures.items() if kind in KINDS}
-    answers = sum(model.per_ray(kind, seen.n, seen.clutter)[2] * number for kind, number in rays.items())
+    answers = sum(model.per_ray(kind, seen.measures)[2] * number for kind, number in rays.items())
     return max(seconds - answers, 0.0) / max(sum(rays.values()), 1)
 
 
-def _even(n):
-    """Triangles of one size all over a sphere, as a mesh has them."""
+def _triangles(n, side=1.0, drawn=0.0):
+    """Triangles all over a sphere, as a mesh has them, or drawn to its middle."""
     rng = np.random.default_rng(n)
     centre = rng.normal(size=(n, 3))
     centre /= np.linalg.norm(centre, axis=1, keepdims=True)
-    side = 1.5 * n**-0.5
-    corners = centre[:, None] + side * rng.normal(size=(n, 3, 3))
+    corners = (centre * rng.random((n, 1)) ** drawn)[:, None] + side * 1.5 * n**-0.5 * rng.normal(size=(n, 3, 3))
     return Scene.from_triangles(corners.reshape(-1, 3), np.arange(3 * n).reshape(-1, 3))
 
 
-def _lit(scene):
-    """The same with a camera that sees all of it, and a lamp beside."""
-    return Scene(scene.objects, [Light("lamp", "point", (1.0, 1.0, 1.0), (2.0, -3.0, 3.0))], Camera.look_at((3.0, -3.0, 2.0), (0.0, 0.0, 0.0)))
-
-
-def _uneven(n):
-    """The same, most of it shrunk into a corner of large triangles."""
-    scene = _even(n)
-    corners = scene.objects[0].geometry.vertices.reshape(-1, 3, 3).copy()
-    corners[: 3 * n // 4] = corners[: 3 * n // 4] * 0.03 + 0.4
-    return Scene.from_triangles(corners.reshape(-1, 3), np.arange(3 * n).reshape(-1, 3))
+def _lit(scene, drawn=0.0):
+    """The same with a camera that looks at it, from nearer where most is in the middle, and a lamp beside."""
+    eye = np.array((3.0, -3.0, 2.0)) / (1.0 + 0.5 * drawn)
+    return Scene(scene.objects, [Light("lamp", "point", (1.0, 1.0, 1.0), (2.0, -3.0, 3.0))], Camera.look_at(eye, (0.0, 0.0, 0.0)))
 
 
 def _fit(name, core, scenes, looked, sets, brute):
-    """The model of one technique, and the largest factor by which it is wrong; `brute` is brute force's, once it is known."""
+    """The model of one technique; `brute` is brute force's, once it is known."""
     builds, lazies, counts, times, waves = [], [], {}, [], []
-    row = technique(name)
-    for scene, batches in zip(scenes, sets):
+    row, fewer = technique(name), RAYS[core][1]
+    for k, (scene, seen, batches) in enumerate(zip(scenes, looked, sets)):
         start = time.thread_time()
         index = build(scene, name, core)
         builds.append(time.thread_time() - start)
         lazies.append(0.0)
-        for batch in batches:
-            if batch.kind not in row.rays:
-                continue
+        for batch in (batch for batch in batches if batch.kind in row.rays):
+            few = batch.take(slice(0, fewer))
             if row.family == "directional":                             # lists that are made when the first rays come
-                first, again = (_measured(index, batch.take(slice(0, RAYS[core][1])), RAYS[core][1])[2] for _ in range(2))
-                lazies[-1] += max(first - again, 0.0) * RAYS[core][1]
-            *both, seconds, wave = _measured(index, batch, RAYS[core][1])
-            waves.append(wave)
-            counts.setdefault(batch.kind, []).append(both)
-            times.append((*both, seconds))
-        tree = index.figures.get("depth", 0) > 2
-    n = np.log([seen.n + 1.0 for seen in looked])
-    clutter = np.log([seen.clutter for seen in looked])
+                first, again = (_asked(index, few) for _ in range(2))
+                lazies[-1] += max(first - again, 0.0)
+            both = _counted(index, few)
+            for c, count in zip(("n_it", "n_ts"), both):
+                counts.setdefault(c, {}).setdefault((batch.kind, c), []).append((seen.measures, count))
+            if k < TIMED:
+                seconds, wave = _timed(index, batch, few, both[0])
+                times.append((*both, seconds))
+                waves.append(wave)
+
+    n = np.log([seen.n + 1.0 for seen in looked[:TIMED]])
 
     def power(seconds):
-        y = np.log(np.maximum(seconds[:2], 1e-7))
+        y = np.log(np.maximum(seconds[:TIMED], 1e-7))
         slope = float(np.clip((y[1] - y[0]) / (n[1] - n[0]), 0.5, 1.3))
         return float(y[1] - slope * n[1]), slope
 
-    fitted = {(kind, c): _growth(n, clutter, np.array(rows)[:, k] + 1.0, tree) for kind, rows in counts.items() if len(rows) == len(scenes)
-              for k, c in enumerate(("n_it", "n_ts"))}
     n_it, n_ts, seconds = np.array(times).T
+    fitted = {key: value for own in counts.values() for key, value in _followed(own).items()}
     if brute is None:
         ray, test = _not_negative(np.stack([np.ones_like(n_it), n_it], axis=1), seconds)
-        return Model(power(builds), fitted, (ray, test, 0.0), wave=float(np.median(waves))), 1.0
+        return Model(power(builds), fitted, (ray, test, 0.0), wave=float(np.median(waves)))
     test = brute.ns[1]
     ray, step = _not_negative(np.stack([np.ones_like(n_ts), n_ts], axis=1) / seconds[:, None], 1.0 - test * n_it / seconds, relative=False)
     ratio = (ray + test * n_it + step * n_ts) / seconds
-    model = Model(power(builds), fitted, (ray, test, step), power(lazies), row.rays == ("shadow",), wave=float(np.median(waves)))
-    return model, float(np.maximum(ratio, 1.0 / ratio).max())
+    return Model(power(builds), fitted, (ray, test, step), power(lazies), row.rays == ("shadow",), wave=float(np.median(waves)),
+                 off=float(np.exp(np.sqrt(np.mean(np.log(ratio) ** 2)))))
 
 
-def _measured(index, batch, fewer):
-    """N_IT, N_TS and seconds of a ray, and the seconds that do not grow with the number of rays."""
-    def ask(rays):
-        start = time.thread_time()                                      # not the clock: others may use the processor too
-        answer = rays.ask(index, count=True)
-        seconds = time.thread_time() - start
-        counts = answer[1] if isinstance(answer, tuple) else {"n_it": answer.n_it, "n_ts": answer.n_ts}
-        return float(np.mean(counts["n_it"])), float(np.mean(counts["n_ts"])), seconds
-
-    n_it, n_ts, less = ask(batch.take(slice(0, fewer)))
-    if n_it * len(batch) > TESTS or len(batch) <= fewer:
-        return n_it, n_ts, less / fewer, 0.0
-    n_it, n_ts, seconds = ask(batch)
-    ray = max((seconds - less) / (len(batch) - fewer), 0.1 * seconds / len(batch))
-    return n_it, n_ts, ray, max(less - fewer * ray, 0.0)
+def _followed(counts):
+    """Of one count, for each kind of ray: the measure that it follows best on all scenes and kinds, and the factor."""
+    best, least = {}, math.inf
+    for measure in FOLLOWED:
+        logs = {key: np.log([(count + 0.01) / (getattr(m, measure) + 0.01) for m, count in rows]) for key, rows in counts.items()}
+        spread = sum(float(((values - values.mean()) ** 2).sum()) for values in logs.values())
+        if spread < least - 1e-9:
+            best, least = {key: (measure, float(np.exp(values.mean()))) for key, values in logs.items()}, spread
+    return best
 
 
-def _growth(n, clutter, count, tree):
-    """How a count grows: (a, b, c, tree), from two even scenes and an uneven one.
+def _asked(index, rays):
+    """Seconds of an answer; of the thread: others may use the processor too."""
+    start = time.thread_time()
+    rays.ask(index)
+    return time.thread_time() - start
 
-    That of a tree is (a + b log n) clutter^c - 1, that of anything else e^a n^b clutter^c - 1; b and c are no larger
-    than they can be.
-    """
-    y = count if tree else np.log(count)
-    b = float(np.clip((y[1] - y[0]) / (n[1] - n[0]), 0.0, np.inf if tree else 1.0))
-    a = float(y[1] - b * n[1])
-    plain = math.log(max(a + b * n[2], 1.0)) if tree else a + b * n[2]
-    c = float(np.clip((math.log(count[2]) - plain) / max(clutter[2], 1e-9), 0.0, 1.0))
-    return a, b, c, tree
+
+def _counted(index, rays):
+    """N_IT and N_TS of a ray."""
+    answer = rays.ask(index, count=True)
+    counts = answer[1] if isinstance(answer, tuple) else {"n_it": answer.n_it, "n_ts": answer.n_ts}
+    return float(np.mean(counts["n_it"])), float(np.mean(counts["n_ts"]))
+
+
+def _timed(index, batch, few, n_it):
+    """Seconds of a ray, and those that do not grow with the number of rays; uncounted, for rays may then go other ways."""
+    less = _asked(index, few)
+    if n_it * len(batch) > TESTS or len(batch) <= len(few):
+        return less / len(few), 0.0
+    seconds = _asked(index, batch)
+    ray = max((seconds - less) / (len(batch) - len(few)), 0.1 * seconds / len(batch))
+    return ray, max(less - len(few) * ray, 0.0)
 
 
 def _not_negative(x, y, relative=True):
@@ -398,8 +461,8 @@ def _not_negative(x, y, relative=True):
 
 # --- the choice -------------------------------------------------------------------------------------------------------
 
-def choose(seen, rays, core="fast"):
-    """A technique for each kind of ray: the least time for building and tracing together.
+def choose(seen, rays, core="fast", calls=None):
+    """A technique for each kind of ray: the least time for building and tracing together. STANDARD is there already.
 
     Parameters
     ----------
@@ -407,6 +470,8 @@ def choose(seen, rays, core="fast"):
     rays : dict
         Kind of ray -> number, of those that are needed.
     core : {"fast", "pure"}
+    calls : dict, optional
+        Kind of ray -> number of batches that they come in; as few as may be if absent.
 
     Returns
     -------
@@ -416,25 +481,28 @@ def choose(seen, rays, core="fast"):
         What each candidate would take: technique, T_B, and per kind that it serves N_IT, N_TS and seconds for all rays;
         s: in all, with STANDARD for the other kinds.
     """
-    models, _ = calibration(core)
+    models = candidates(core)
     rows, cost = [], {}
     builds = {name: model.build_seconds(seen.n, len(seen.lights)) for name, model in models.items()}
     serve = {kind: [name for name in models if kind in technique(name).rays] for kind in rays}
+    calls = {kind: max((calls or {}).get(kind, 1), 1 + number // WAVE) for kind, number in rays.items()}
 
     def total(combination):
-        return sum(builds[name] for name in set(combination)) + sum(cost[n, k] for n, k in zip(combination, rays))
+        return sum(builds[name] for name in set(combination) - {STANDARD}) + sum(cost[n, k] for n, k in zip(combination, rays))
 
     for name, model in sorted(models.items(), key=lambda item: item[0] != STANDARD):
-        row = {"technique": name, "T_B": builds[name]}
+        row = {"technique": name, "T_B": seen.build if name == STANDARD and seen.build else builds[name]}
         for kind, number in rays.items():
             if name in serve[kind]:
-                n_it, n_ts, seconds = model.per_ray(kind, seen.n, seen.clutter)
-                cost[name, kind] = seconds * number + model.wave * (1 + number // WAVE)
+                n_it, n_ts, seconds = model.per_ray(kind, seen.measures)
+                cost[name, kind] = seconds * number + model.wave * calls[kind]
                 row |= {f"N_IT {kind}": n_it, f"N_TS {kind}": n_ts, f"s {kind}": cost[name, kind]}
         if len(row) > 2:
             row["s"] = total([name if name in serve[kind] else STANDARD for kind in rays])
             rows.append(row)
     standard = (STANDARD,) * len(rays)
+    # Of each kind only those that would be quicker with no build at all.
+    serve = {kind: [name for name in names if cost[name, kind] <= cost[STANDARD, kind]] for kind, names in serve.items()}
     best = min(itertools.product(*serve.values()), key=total) if rays else ()
     besides = models[STANDARD].shading * sum(rays.values())             # which no choice saves
     if rays and total(best) + besides > (1.0 - MARGIN) * (total(standard) + besides):
@@ -452,17 +520,59 @@ def expected_rays(seen, pixels, samples=1, depth=5):
     return {kind: number for kind, number in needed.items() if number}
 
 
-def resolve_automatic(scene, size, samples, depth, core, kinds):
-    """What the tracer asks: the technique for each of some kinds of ray.
+def expected_calls(seen, rays, depth=5):
+    """Kind of ray -> number of batches: a reflection is traced after what it is seen in, lights one by one."""
+    waves = {kind: 1 + number // WAVE for kind, number in rays.items()}
+    secondary = max(waves.get("secondary", 0), depth if "secondary" in rays else 0)
+    return waves | {"secondary": secondary, "shadow": max(waves.get("shadow", 0), (waves["primary"] + secondary) * len(seen.lights))}
+
+
+def resolve_automatic(scene, index, size, samples, depth, core, kinds):
+    """What the tracer asks: the technique for each of some kinds of ray; `index` is STANDARD over the scene.
 
     Returns
     -------
     dict
-        Kind of ray -> name.
+        Kind of ray -> names: the choice, and what may be quicker and is worth trying.
     """
-    seen = survey(scene)
+    seen = survey(scene, index)
     rays = expected_rays(seen, size[0] * size[1], samples, depth)
-    return choose(seen, {kind: max(rays.get(kind, 0), 1) for kind in kinds}, core)[0]
+    calls = expected_calls(seen, rays, depth)
+    choice, rows = choose(seen, {kind: max(rays.get(kind, 0), 1) for kind in kinds}, core, calls)
+    return contenders(choice, rows, candidates(core)[STANDARD].shading * sum(rays.values()))
+
+
+def contenders(choice, rows, besides):
+    """What else may be quicker than a choice, as the model is not exact: to be found out while the picture is traced.
+
+    Parameters
+    ----------
+    choice : dict
+    rows : list of dict
+        Both as of :func:`choose`.
+    besides : float
+        Seconds that the picture takes besides.
+
+    Returns
+    -------
+    dict
+        Kind of ray -> names: the choice, then at most OTHERS others that are built anyway, or in a small part of the
+        picture's time.
+    """
+    of = {row["technique"]: row for row in rows}
+    left = TRIED * (besides + sum(of[name][f"s {kind}"] for kind, name in choice.items()))
+    built, found = {STANDARD, *choice.values()}, {}
+    for kind, name in choice.items():
+        found[kind] = [name]
+        own = sorted((row for row in rows if f"s {kind}" in row), key=lambda row: row[f"s {kind}"])
+        for row in own:
+            other, more = row["technique"], 0.0 if row["technique"] in built else row["T_B"]
+            now = of[name][f"s {kind}"]
+            if other != name and row[f"s {kind}"] < DOUBT * now and more < min(left, REPAID * now) and len(found[kind]) <= OTHERS:
+                found[kind].append(other)
+                built.add(other)
+                left -= more
+    return {kind: tuple(names) for kind, names in found.items()}
 
 
 # --- the plan ---------------------------------------------------------------------------------------------------------
@@ -512,11 +622,11 @@ def plan(scene, size=(640, 480), samples=1, depth=5, core="fast"):
     RayscopeError
         When there is nothing to trace.
     """
-    seen = survey(scene)
-    if not seen.n:
+    if not scene.n_primitives:
         raise RayscopeError(f"{scene.name}: there is nothing to trace: no object with a surface. Add a mesh, or check what is hidden in renders.")
+    seen = survey(scene)
     rays = expected_rays(seen, size[0] * size[1], samples, depth)
-    choice, rows = choose(seen, rays, core)
+    choice, rows = choose(seen, rays, core, expected_calls(seen, rays, depth))
     return Plan(seen, rays, choice, rows, _left_out(seen, rays, choice, rows, core, size[0] * size[1] * samples, depth), _precision(seen))
 
 
@@ -531,7 +641,7 @@ def _left_out(seen, rays, choice, rows, core, primary, depth):
     def time_of(kind, number):
         # By the technique that is there already, if it serves them.
         name = next((name for name in choice.values() if kind in technique(name).rays), STANDARD)
-        return f"about {models[name].per_ray(kind, seen.n, seen.clutter)[2] * number:.2g} s for {number:,} rays"
+        return f"about {models[name].per_ray(kind, seen.measures)[2] * number:.2g} s for {number:,} rays"
 
     third = max(primary // 3, 1)                                        # as `expected_rays` has it
     if "secondary" not in rays:
@@ -633,8 +743,8 @@ def text(result):
     """A plan in words."""
     seen = result.seen
     kinds = ", ".join(f"{number:,} x {kind}" for kind, number in seen.kinds.items())
-    lines = [f"The scene: {kinds}; spread {'evenly' if seen.clutter < 8 else 'unevenly'} ({seen.clutter:.3g} primitives share a cell); looked at in "
-             f"{1e3 * seen.seconds:.2g} ms.", "", "It takes:"]
+    lines = [f"The scene: {kinds}; a line through it meets {seen.measures.pierced:.3g} of their boxes, and ends among "
+             f"{seen.measures.crowd:.3g} in one cell of a grid; looked at in {1e3 * seen.seconds:.2g} ms.", "", "It takes:"]
     for kind, name in result.choice.items():
         row = next(r for r in result.rows if r["technique"] == name)
         lines.append(f"  {kind} rays: {name} ({technique(name).label}); about {result.rays[kind]:,} rays, {row[f's {kind}']:.2g} s, N_IT {row[f'N_IT {kind}']:.3g}, "

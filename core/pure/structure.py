@@ -70,6 +70,16 @@ class Structure:
         index.scene, index.technique = scene, row
         return index
 
+    @classmethod
+    def beside(cls, other, row, parameters, progress=None):
+        """Build over the scene of another structure, whose primitives are used again; inside instances each technique has
+        structures of its own."""
+        if any(p.KIND == "instance" for p in other.primitives):
+            return cls.over(other.scene, row, parameters, progress)
+        index = cls(list(other.primitives), parameters, progress)
+        index.scene, index.technique = other.scene, row
+        return index
+
     def build(self, progress, **parameters):
         """Build over ``self.primitives`` and fill in ``self.figures``."""
         raise NotImplementedError

@@ -56,6 +56,10 @@ class RayClassification(Structure):
         index.scenes, index.scene, index.technique = scenes, scenes[0], row
         return index
 
+    @classmethod
+    def beside(cls, other, row, parameters, progress=None):
+        return cls.over(other.scene, row, parameters, progress)         # what is inside instances is made for it
+
     def build(self, progress, leaf_size, max_depth, similarity, max_bytes):
         self.bounds = Bounds(self.frames)
         self.cubes = Hypercubes(self.bounds, leaf_size, max_depth, similarity, max_bytes)
