@@ -279,6 +279,8 @@ def trace_options(sub):
     sub.add_argument("--seed", type=int, default=0)
     sub.add_argument("--threshold", type=float, default=0.0, help="rays with less weight in their pixel are not traced")
     sub.add_argument("--roulette", action="store_true", help="trace some of the rays below the threshold, by chance, for the others")
+    sub.add_argument("--sampling", choices=("stratified", "random"), default="stratified",
+                     help="points of the pixel and of lights, over the samples of a pixel: spread evenly, or each at random by itself")
     sub.add_argument("--antialiasing", choices=("uniform", "corners", "variance"), default="uniform",
                      help="equally many samples in all pixels, or more where corners differ or where the variance is high")
     sub.add_argument("--aa-threshold", type=float, default=0.03, help="difference in displayed values, 0 to 1, that is put up with")
@@ -299,7 +301,7 @@ def trace_verb(call):
     others = {kind: checked(choice, call.core) for kind in ("primary", "secondary", "shadow") if (choice := getattr(call, kind))}
     check_output("--image", call.image)
     check_output("--figures", call.figures)
-    fewer = {name: getattr(call, name) for name in ("threshold", "roulette", "antialiasing", "aa_threshold", "aa_level", "light_samples")}
+    fewer = {name: getattr(call, name) for name in ("threshold", "roulette", "sampling", "antialiasing", "aa_threshold", "aa_level", "light_samples")}
     scene = call.scene(call.size)
     size = call.size or proportional(scene.camera)
     expected = estimate(scene, "bvh" if name == AUTOMATIC else name, call.core, size, max(call.samples, 1), max(call.depth, 0)).check_memory()

@@ -19,6 +19,12 @@ PARAMETERS = (
     ),
     Parameter("roulette", False, "Trace some of the rays below the threshold, by chance, for the others"),
     Parameter(
+        "sampling",
+        "stratified",
+        "Points of the pixel and of lights, over the samples of a pixel: spread evenly; or each at random by itself",
+        choices=("stratified", "random"),
+    ),
+    Parameter(
         "antialiasing",
         "uniform",
         "Samples: equally many in all pixels; at the corners of pixels, divided where these differ (Whitted); "

@@ -78,31 +78,45 @@ class Result:
     cancelled: bool = False
 
 
-def trace(
-    scene,
-    technique="bvh",
-    core="fast",
-    size=(640, 480),
-    depth=5,
-    samples=1,
-    seed=0,
-    primary=None,
-    shadow=None,
-    secondary=None,
-    region=None,
-    index=None,
-    progress=None,
-    on_tile=None,
-    count=False,
-    parameters=None,
-    threshold=0.0,
-    roulette=False,
-    antialiasing="uniform",
-    aa_threshold=0.03,
-    aa_level=2,
-    light_samples=1,
-):
+def trace(scene, *arguments, on_tile=None, **more):
     """Trace a picture as Whitted (1980) did.
+
+    Parameters
+    ----------
+    scene, *arguments, **more
+        As of :class:`Rendering`.
+    on_tile : callable, optional
+        Called as ``on_tile(x0, y0, x1, y1)`` when that part of the image holds new samples. Tiles come from the centre
+        outwards; with several samples the whole picture gets one after the other, small ones several at once.
+
+    Returns
+    -------
+    Result
+        What was done when the run was stopped, too, once the structures were built.
+
+    Raises
+    ------
+    SceneError
+        Without a camera, for an impossible size or region.
+    ParameterError
+        For unknown names and values out of range.
+    MemoryEstimateError
+        When picture or structures would not fit into memory.
+    Cancelled
+        When stopped while structures were built.
+    """
+    rendering = Rendering(scene, *arguments, **more)
+    for tile in rendering.tiles():
+        if on_tile:
+            on_tile(*tile)
+    return rendering.result
+
+
+class Rendering:
+    """A picture in the making.
+
+    The constructor checks everything and builds the structures; :meth:`tiles` traces. A thread may run it while another
+    reads ``result.image``. What may be raised: see :func:`trace`.
 
     Parameters
     ----------
@@ -130,82 +144,31 @@ def trace(
     progress : callable, optional
         Called as ``progress(fraction)`` every few ten milliseconds; stops the run by raising
         :class:`~rayscope.core.errors.Cancelled`.
-    on_tile : callable, optional
-        Called as ``on_tile(x0, y0, x1, y1)`` when that part of the image holds a new sample. Tiles come from the centre
-        outwards; with several samples the whole picture gets one after the other.
     count : bool
         Also count intersection tests and traversal steps.
     parameters : dict, optional
         Of `technique`.
     threshold : float
         Dynamic recursion control: reflected, refracted and transparent rays whose weight in their pixel is less, in
-        every colour, are not traced; 0 traces all up to `depth`.
+        every colour, are not traced (Hall and Greenberg 1983); 0, the default, traces all up to `depth`.
     roulette : bool
-        Such a ray is traced with the probability weight / threshold, and then weighs `threshold`: the mean over many
-        samples is right, at the price of noise.
+        Such a ray is traced with the probability weight / threshold, and then weighs `threshold` (Arvo and Kirk 1990):
+        the mean over many samples is right, at the price of noise. Default False.
+    sampling : {"stratified", "random"}
+        The points of the pixel and of lights that the samples of a pixel, and the shadow rays of each, choose: spread
+        evenly over pixel and light, or each by itself. Default stratified.
     antialiasing : {"uniform", "corners", "variance"}
         Where samples are taken: `samples` in each pixel; at the pixels' corners, and where these differ in colour,
         object or depth, at those of their quarters and so on (Whitted 1980); `samples`, but at least 4, in each pixel,
-        and more where their variance is high. Both adaptive ways sample lights that have an extent.
+        and more where their variance is high. Both adaptive ways sample lights that have an extent. Default uniform.
     aa_threshold : float
         Difference in displayed values, 0 to 1, that is put up with: between the corners; as the standard error of a
-        pixel.
+        pixel. Default 0.03.
     aa_level : int
-        4**aa_level samples a pixel, at most; corners are divided `aa_level` times.
+        4**aa_level samples a pixel, at most; corners are divided `aa_level` times. Default 2.
     light_samples : int
         Shadow rays to each light that has an extent, wherever a surface is shaded. With more than one, its shadows are
-        soft also with one sample a pixel.
-
-    Returns
-    -------
-    Result
-        What was done when the run was stopped, too, once the structures were built.
-
-    Raises
-    ------
-    SceneError
-        Without a camera, for an impossible size or region.
-    ParameterError
-        For unknown names and values out of range.
-    MemoryEstimateError
-        When picture or structures would not fit into memory.
-    Cancelled
-        When stopped while structures were built.
-    """
-    rendering = Rendering(
-        scene,
-        technique,
-        core,
-        size,
-        depth,
-        samples,
-        seed,
-        primary,
-        shadow,
-        secondary,
-        region,
-        index,
-        progress,
-        count,
-        parameters,
-        threshold,
-        roulette,
-        antialiasing,
-        aa_threshold,
-        aa_level,
-        light_samples,
-    )
-    for tile in rendering.tiles():
-        if on_tile:
-            on_tile(*tile)
-    return rendering.result
-
-
-class Rendering:
-    """A picture in the making; parameters as of :func:`trace`.
-
-    The constructor checks everything and builds the structures; :meth:`tiles` traces. A thread may run it while another
-    reads ``result.image``.
+        soft also with one sample a pixel. Default 1.
 
     Attributes
     ----------
@@ -229,21 +192,13 @@ class Rendering:
         progress=None,
         count=False,
         parameters=None,
-        threshold=0.0,
-        roulette=False,
-        antialiasing="uniform",
-        aa_threshold=0.03,
-        aa_level=2,
-        light_samples=1,
+        **options,
     ):
         if core not in CORES:
             raise ParameterError(f"trace: there is no core {core!r}. Cores: {', '.join(CORES)}.")
-        given = {"depth": depth, "samples": samples, "seed": seed, "threshold": threshold, "roulette": roulette}
-        given |= {"antialiasing": antialiasing, "aa_threshold": aa_threshold, "aa_level": aa_level}
-        given["light_samples"] = light_samples
-        values = resolve("trace", PARAMETERS, given, core)
+        options = resolve("trace", PARAMETERS, {"depth": depth, "samples": samples, "seed": seed, **options}, core)
         self.scene, self.core, self.count = scene, core, bool(count)
-        self.samples = values["samples"]
+        self.samples, antialiasing = options["samples"], options["antialiasing"]
         self.size = check_size(size)
         if scene.camera is None:
             raise SceneError(
@@ -260,7 +215,7 @@ class Rendering:
         names = [name for name in PASSES if self.count or name not in COUNTED_PASSES]
         self._progress, self._fraction, self._told = progress, 0.0, -math.inf
         self._standard, self._contenders = None, {}     # what an automatic choice starts from, and what it is not sure of
-        wanted = self._wanted(technique, parameters, primary, shadow, secondary, index, values["depth"])
+        wanted = self._wanted(technique, parameters, primary, shadow, secondary, index, options["depth"])
         passes = _framebuffer(self.size, names)
         self.result = Result(passes["combined"], passes, notices=_notices(scene))
         self._build(wanted, index)
@@ -275,24 +230,14 @@ class Rendering:
             self.result.notices.append(
                 Notice(row.name, "each pixel is traced as a whole, once: samples and antialiasing were left aside.")
             )
-        self._tracer = tracer(
-            scene,
-            self.result.structures,
-            self.size,
-            values["depth"],
-            self.samples if antialiasing == "uniform" else 4 ** values["aa_level"],
-            values["seed"],
-            self.count,
-            self._check,
-            values["threshold"],
-            values["roulette"],
-            values["light_samples"],
-        )
+        samples = self.samples if antialiasing == "uniform" else 4 ** options["aa_level"]
+        given = {**options, "samples": samples}
+        self._tracer = tracer(scene, self.result.structures, self.size, given, self.count, self._check)
         self.result.notices += self._tracer.notices
         self._adaptive = None
         if antialiasing != "uniform":
             way = import_module(f".{core}.tracing.adaptive", __package__).WAYS[antialiasing]
-            self._adaptive = way(self._tracer, self.region, values["aa_threshold"], values["aa_level"], self.samples)
+            self._adaptive = way(self._tracer, self.region, options["aa_threshold"], options["aa_level"], self.samples)
 
     def _wanted(self, technique, parameters, primary, shadow, secondary, index, depth):
         """Kind of ray -> (technique, its parameters), or None for `index`; only the kinds that the scene needs."""
@@ -418,24 +363,29 @@ class Rendering:
     def _sampled(self, order):
         """Take as many samples everywhere; yield how much is done, and the tile."""
         x0, y0, x1, y1 = self.region
-        total, done = (x1 - x0) * (y1 - y0) * self.samples, 0
-        for sample in range(self.samples):
+        pixels, before, done = (x1 - x0) * (y1 - y0), 0, 0
+        while before < self.samples:
+            # First something to see, then as many at once as are worth it.
+            n = min(self._tracer.together // pixels, self.samples - before) if before else 1
+            n = max(n, 1)
+            numbers = range(before, before + n) if n > 1 else before
             for tile in order:
-                self._keep(tile, sample, self._tracer.tile(*tile, sample))
-                done += (tile[2] - tile[0]) * (tile[3] - tile[1])
-                yield done / total, tile
+                self._keep(tile, before, n, self._tracer.tile(*tile, numbers))
+                done += n * (tile[2] - tile[0]) * (tile[3] - tile[1])
+                yield done / (pixels * self.samples), tile
+            before += n
 
     def _refined(self, order):
         """Take samples where they are needed; yield how much is done, and the tile."""
         for fraction, tile, values, (pixels, spent) in self._adaptive.parts(order):
-            self._keep(tile, 0, values)
+            self._keep(tile, 0, 1, values)
             for name, cost in spent.items():
                 target = self.result.passes[name].reshape(-1)
                 np.add.at(target, pixels, np.asarray(cost, target.dtype))
             yield fraction, tile
 
-    def _keep(self, tile, sample, values):
-        """Put a tile into the framebuffer."""
+    def _keep(self, tile, before, n, values):
+        """Put n samples of a tile into the framebuffer, which holds `before` of them."""
         x0, y0, x1, y1 = tile
         shape = (y1 - y0, x1 - x0)
         for name, value in values.items():
@@ -447,7 +397,7 @@ class Rendering:
             )
             if name == "combined":
                 # The mean so far; a picture stopped now is complete.
-                target[..., :3] += (value - target[..., :3]) / (sample + 1)
+                target[..., :3] += (value - target[..., :3]) * (n / (before + n))
                 target[..., 3] = 1.0
             elif name in ("rays_per_pixel", *COUNTED_PASSES):
                 target += value.astype(target.dtype)

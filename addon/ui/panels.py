@@ -163,6 +163,7 @@ class Tracing:
         column.prop(settings, "depth")
         column.prop(settings, "seed")
         fewer = settings.fewer_rays
+        column.prop(fewer, "sampling")
         column.prop(fewer, "antialiasing")
         if fewer.antialiasing != "uniform":
             column.prop(fewer, "aa_threshold")

@@ -172,7 +172,7 @@ def test_fewer_rays_than_16_uniform_samples_for_the_same_error():
     scene, size = lit(), (48, 36)
 
     def measured(**how):
-        result = trace(scene, size=size, seed=3, **how)
+        result = trace(scene, size=size, seed=3, sampling="random", **how)
         rays = sum(f["rays"] for f in result.figures.values() if isinstance(f, dict))
         return math.sqrt(np.mean((result.image - reference(size)) ** 2)), rays
 
@@ -219,7 +219,7 @@ def test_impossible_values(bad):
 
 
 def test_shadow_rays_to_a_light_count_and_smooth():
-    """One light sampled four times: four times the shadow rays, half the noise, in both cores the same."""
+    """One light sampled four times: four times the shadow rays, a quarter of the noise or less, the same in both cores."""
     scene = lit()
     fast, pure = (trace(scene, "brute", core, (9, 7), 2, samples=2, light_samples=3) for core in ("fast", "pure"))
     np.testing.assert_allclose(fast.image, pure.image, atol=1e-5)
@@ -233,7 +233,7 @@ def test_shadow_rays_to_a_light_count_and_smooth():
         for n in (4, 16)
     }
     noise = {n: math.sqrt(np.mean(images.var(axis=0))) for n, images in runs.items()}
-    assert 0.35 < noise[16] / noise[4] < 0.7
+    assert 0.1 < noise[16] / noise[4] < 0.3  # a half, were they not spread evenly
 
 
 def test_the_command_takes_them(tmp_path, capsys):

@@ -52,20 +52,21 @@ def test_measures_by_hand():
     assert errors(np.full((2, 2, 4), 5.0), np.ones((2, 2, 4)))["rmse"] == 0
 
 
-def test_uniform_sampling_converges_as_the_root_of_the_samples():
-    """RMSE against samples, on edges and soft shadows together: slope -1/2 within 15 %."""
+@pytest.mark.parametrize("way, least, most", [("random", -0.575, -0.425), ("stratified", -1.0, -0.65)])
+def test_how_uniform_sampling_converges(way, least, most):
+    """RMSE against samples, on edges and soft shadows together: slope -1/2 within 15 %, if random; stratified, -3/4."""
     scene, size = room(mirror=False), (24, 18)
     counts = (4, 16, 64)
     reference = sum(np.asarray(trace(scene, size=size, samples=512, seed=s).image, float) for s in (90, 91)) / 2
     rmse = []
     for n in counts:
         squares = [
-            np.mean((displayed(trace(scene, size=size, samples=n, seed=s).image) - displayed(reference)) ** 2)
+            np.mean((displayed(trace(scene, size=size, samples=n, seed=s, sampling=way).image) - displayed(reference)) ** 2)
             for s in range(4)
         ]
         rmse.append(math.sqrt(np.mean(squares)))
     slope = np.polyfit(np.log(counts), np.log(rmse), 1)[0]
-    assert -0.575 < slope < -0.425
+    assert least < slope < most
 
 
 def test_tessellations_come_closer_to_the_solids():

@@ -183,7 +183,7 @@ def test_both_cores_draw_the_same_picture(samples, depth, camera):
     scene = everything()
     if camera == "orthographic":
         scene.camera.kind, scene.camera.window = camera, (-4, 4, -3, 3)
-    fast, pure = (trace(scene, "bvh", core, (24, 18), depth, samples, seed=7) for core in ("fast", "pure"))
+    fast, pure = (trace(scene, "bvh", core, (24, 18), depth, samples, seed=8) for core in ("fast", "pure"))
     assert fast.passes.keys() == pure.passes.keys()
     for name in fast.passes:
         np.testing.assert_allclose(fast.passes[name], pure.passes[name], rtol=1e-5, atol=1e-4, err_msg=name)
@@ -207,6 +207,12 @@ def test_random_numbers_are_the_same_bits_in_both_cores():
             assert fast.branch(keys, 2).tolist() == [pure.branch(k, 2) for k in keys.tolist()]
             for dimension in (0, 1, 57):
                 assert fast.number(keys, dimension).tolist() == [pure.number(k, dimension) for k in keys.tolist()]
+            keys = fast.first_key(np.array(pixels), sample, seed, stratified=True)
+            assert keys.tolist() == [pure.first_key(p, sample, seed, stratified=True) for p in pixels]
+            assert fast.branch(keys, 2).tolist() == [pure.branch(k, 2) for k in keys.tolist()]
+            for dimension, n, k in ((0, 1, 0), (2, 1, 0), (57, 5, 3), (3, 4096, 4095)):
+                both = np.transpose(fast.pair(keys, dimension, n, k)).tolist()
+                assert both == [list(pure.pair(key, dimension, n, k)) for key in keys.tolist()]
 
 
 def test_random_numbers_are_uniform_and_unrelated():
@@ -226,6 +232,46 @@ def test_random_numbers_are_uniform_and_unrelated():
     np.testing.assert_allclose(columns.mean(axis=1), 0.5, atol=5 / math.sqrt(12 * n))
     correlation = np.corrcoef(columns) - np.eye(len(columns))
     assert np.abs(correlation).max() < 5 / math.sqrt(n)
+
+
+def test_stratified_points_lie_one_in_each_box():
+    """The (0,2)-sequence: of 64 points in a row one in each of 64 boxes, of whatever shape; also of a branch's."""
+    from rayscope.core.fast.tracing import sampling
+
+    for pixel in range(20):
+        for begin in (0, 64, 640):
+            key = sampling.branch(sampling.first_key(pixel, np.arange(begin, begin + 64), 1, stratified=True), 1)
+            by_samples = sampling.pair(key, 4)
+            four = sampling.first_key(pixel, np.arange(begin // 4, begin // 4 + 16), 1, stratified=True)
+            by_rays = np.concatenate([sampling.pair(four, 9, 4, k) for k in range(4)], axis=1)
+            for u, v in (by_samples, by_rays):
+                for a in range(7):
+                    box = (u * 2**a).astype(int) * 2 ** (6 - a) + (v * 2 ** (6 - a)).astype(int)
+                    assert len(np.unique(box)) == 64
+
+
+def test_sequences_of_pixels_dimensions_and_branches_are_unrelated():
+    from rayscope.core.fast.tracing import sampling
+
+    n = 20_000
+    first = sampling.first_key(np.arange(n), 5, 1, stratified=True)
+    other = sampling.first_key(np.arange(n), 5, 2, stratified=True)
+    keys = [(first, 0), (first, 2), (first, 3), (sampling.branch(first, 1), 0), (other, 0), (np.roll(first, 1), 0)]
+    columns = np.concatenate([sampling.pair(key, dimension) for key, dimension in keys])
+    assert columns.min() >= 0.0 and columns.max() < 1.0
+    np.testing.assert_allclose(columns.mean(axis=1), 0.5, atol=5 / math.sqrt(12 * n))
+    assert np.abs(np.corrcoef(columns) - np.eye(len(columns))).max() < 5 / math.sqrt(n)
+
+
+def test_random_samples_have_no_sequence_in_common():
+    """The points of 4 samples, over many pixels: as far from even as chance makes them."""
+    from rayscope.core.fast.tracing import sampling
+
+    n = 5_000
+    for stratified, full in ((True, 1.0), (False, 4 * 3 * 2 / 4**4)):
+        u = np.stack([sampling.pair(sampling.first_key(np.arange(n), s, 1, stratified), 0)[0] for s in range(4)])
+        boxes = np.sort((u * 4).astype(int), axis=0)
+        assert (boxes == np.arange(4)[:, None]).all(axis=0).mean() == pytest.approx(full, abs=0.02)
 
 
 def test_techniques_do_not_change_the_picture():
@@ -350,7 +396,8 @@ def test_cancelling_keeps_what_is_finished(core, monkeypatch):
     assert result.figures["primary"]["rays"] >= finished.sum()
 
 
-def test_cancelling_between_samples_leaves_a_complete_picture():
+def test_cancelling_between_samples_leaves_a_complete_picture(monkeypatch):
+    monkeypatch.setattr("rayscope.core.fast.tracing.whitted.Whitted.together", 2 * 80)
     scene, done = everything(), []
 
     def stop(fraction):
@@ -359,8 +406,8 @@ def test_cancelling_between_samples_leaves_a_complete_picture():
 
     result = trace(scene, "bvh", size=(10, 8), samples=50, progress=stop, on_tile=lambda *tile: done.append(tile))
     assert result.cancelled and (result.image[..., 3] == 1).all()
-    # The mean of the first three samples, which a finished picture of three samples has, too.
-    np.testing.assert_allclose(result.image, trace(scene, "bvh", size=(10, 8), samples=3).image, atol=1e-6)
+    # The first sample, then two at once, twice: their mean, which a finished picture of five samples has, too.
+    np.testing.assert_allclose(result.image, trace(scene, "bvh", size=(10, 8), samples=5).image, atol=1e-6)
 
 
 def test_cancelling_while_building_raises():

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from .sampling import PIXEL, number
+from .sampling import PIXEL, pair
 
 
 def primary(camera, size, pixels, key):
@@ -23,6 +23,6 @@ def primary(camera, size, pixels, key):
         d has length 1 along the viewing axis.
     """
     y, x = np.divmod(pixels, size[0])
-    u, v = (0.5, 0.5) if key is None else (number(key, PIXEL), number(key, PIXEL + 1))
+    u, v = (0.5, 0.5) if key is None else pair(key, PIXEL)
     origins, directions = camera.rays(x + u, y + v, size)
     return np.ascontiguousarray(origins.T), np.ascontiguousarray(directions.T)

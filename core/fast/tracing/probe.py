@@ -6,10 +6,10 @@ from dataclasses import fields
 import numpy as np
 
 from ...hits import Hits
+from ...tracer import COUNTED
 
 #: Seconds that one piece may take: half of what a user may have to wait for the run to stop.
 PIECE = 0.08
-COUNTED = ("n_it", "n_ts", "n_ets", "n_eets")
 
 
 class Probe:

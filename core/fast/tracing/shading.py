@@ -5,12 +5,31 @@ import math
 import numpy as np
 
 from .lights import arriving
-from .sampling import LIGHTS, number
+from .sampling import LIGHTS, pair
 from .vectors import dot, unit
 
 
 def lit(table, surface, d, lights, transmitted, key, check):
-    """What surfaces reflect of the lights.
+    """What surfaces reflect of the lights, shape (3, n).
+
+    Parameters
+    ----------
+    transmitted : callable
+        ``transmitted(surface, which, to, reach, light)``: the share of light, shape (m,) or (3, m), that comes
+        through to the points `which` from `to`.
+    table, surface, d, lights, key, check
+        See :func:`by_light`.
+    """
+    total = np.zeros_like(surface.base)
+    for light, which, to, reach, seen in by_light(table, surface, d, lights, key, check):
+        if light.shadows:
+            seen = seen * transmitted(surface, which, to, reach, light)
+        total[:, which] += seen
+    return total
+
+
+def by_light(table, surface, d, lights, key, check):
+    """What surfaces would reflect of each light, were nothing in between.
 
     Parameters
     ----------
@@ -20,23 +39,29 @@ def lit(table, surface, d, lights, transmitted, key, check):
         Directions of the rays that met the surfaces.
     lights : list of (Light, float)
         Each with the share of it that is to be added: a light that is sampled n times is there n times, by 1 / n.
-    transmitted : callable
-        ``transmitted(surface, which, to, reach, light)``: the share of light, shape (m,) or (3, m), that comes
-        through to the points `which` from `to`.
     key : ndarray of uint64, or None
         Keys of the rays, where lights have an extent to be sampled.
     check : callable
         Called before each light; may raise Cancelled.
 
-    Returns
-    -------
-    ndarray, shape (3, n)
+    Yields
+    ------
+    light : Light
+    which : ndarray, shape (m,), int
+        The surfaces that it reaches.
+    to : ndarray, shape (3, m)
+        From there to the light.
+    reach : float
+        How far the light is in multiples of `to`.
+    seen : ndarray, shape (3, m)
+        Radiance.
     """
-    total = np.zeros_like(surface.base)
     view = unit(d)
+    first, before = 0, None
     for k, (light, share) in enumerate(lights):
         check()
-        u, v = (None, None) if key is None else (number(key, LIGHTS + 2 * k), number(key, LIGHTS + 2 * k + 1))
+        first, before = (first if light is before else k), light
+        u, v = (None, None) if key is None else pair(key, LIGHTS + first, round(1.0 / share), k - first)
         to, reach, towards, irradiance = arriving(light, surface.point, u, v)
         cosine = dot(surface.shading, towards)
         flat = dot(surface.normal, towards)
@@ -59,10 +84,7 @@ def lit(table, surface, d, lights, transmitted, key, check):
             arrives = arrives * terminator(
                 cosine[which], flat[which], dot(surface.normal[:, which], surface.shading[:, which])
             )
-        if light.shadows:
-            arrives = arrives * transmitted(surface, which, to[:, which], reach, light)
-        total[:, which] += reflected * arrives * np.array(light.colour, float)[:, None]
-    return total
+        yield light, which, to[:, which], reach, reflected * arrives * np.array(light.colour, float)[:, None]
 
 
 def terminator(cosine, flat, between):

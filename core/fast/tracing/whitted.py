@@ -12,21 +12,15 @@ import math
 
 import numpy as np
 
+from ...tracer import COUNTED, KINDS, PRIMARY, REFLECTED, REFRACTED, SHADOW, TRANSPARENT, Tracer
 from . import sampling
 from .camera import primary
-from .probe import COUNTED, Probe
+from .probe import Probe
 from .surface import Surfaces
 from .vectors import dot, pushed, unit
 
 #: Rays of a wave, about.
 WAVE = 65_536
-#: Rounding of positions on rays, relative to the scene's largest coordinate.
-ROUNDING = 32 * 2.0**-52
-#: Side of the tiles that the picture is made in.
-TILE = 256
-
-PRIMARY, REFLECTED, REFRACTED, TRANSPARENT, SHADOW = range(5)
-KINDS = ("primary", "reflected", "refracted", "transparent", "shadow")
 
 
 class Wave:
@@ -73,105 +67,48 @@ class Wave:
         )
 
 
-class Whitted:
-    """The tracer of one picture.
+class Whitted(Tracer):
+    """See :class:`~rayscope.core.tracer.Tracer`."""
 
-    Parameters
-    ----------
-    scene : Scene
-    structures : dict
-        ``primary``, ``secondary``, ``shadow``: the structure that answers each kind of ray.
-    size : (int, int)
-    depth : int
-        Reflections and refractions in a row, at most (H).
-    samples : int
-        Samples a pixel that the picture will have.
-    seed : int
-    count : bool
-        Also count intersection tests and traversal steps.
-    check : callable
-        Called without arguments every few ten milliseconds; may raise Cancelled.
-    threshold : float
-        Dynamic recursion control: a ray whose weight in its pixel is less, in every colour, is not traced (Hall and
-        Greenberg 1983).
-    roulette : bool
-        Such a ray is traced with the probability weight / threshold, and then weighs `threshold` (Arvo and Kirk 1990):
-        noise, where leaving it out makes the picture too dark.
-    light_samples : int
-        Shadow rays to each light that has an extent.
+    tile_side = 256
+    together = WAVE
+    #: Structure -> shadow rays that wait to be traced together; None where none may wait.
+    waiting = None
 
-    Attributes
-    ----------
-    tally : dict
-        Per kind of ray: rays, hits, n_it, n_ts, n_ets, n_eets, and saved: rays not traced for their small weight.
-    antialiases : bool
-        Whether one sample a pixel is the whole picture.
-    notices : sequence of Notice
-        What cannot be done as asked.
-    """
-
-    tile_side = TILE
-    antialiases = False
-    notices = ()
-
-    def __init__(
-        self,
-        scene,
-        structures,
-        size,
-        depth,
-        samples,
-        seed,
-        count,
-        check,
-        threshold=0.0,
-        roulette=False,
-        light_samples=1,
-    ):
-        self.scene, self.size, self.depth, self.samples, self.seed, self.count = (
-            scene,
-            size,
-            depth,
-            samples,
-            seed,
-            count,
-        )
-        self.check, self.threshold, self.roulette = check, threshold, roulette and threshold > 0.0
+    def __init__(self, scene, structures, size, options, count, check):
+        super().__init__(scene, structures, size, options, count, check)
         probes = {id(s): Probe(s, check, count) for s in structures.values()}
         self.probe = {kind: probes[id(s)] for kind, s in structures.items()}
-        self.to_light = {}
         self.surfaces = Surfaces(scene)
         self.ambient = np.array(scene.world.ambient_light(), float)
-        self.tally = {kind: dict.fromkeys(("rays", "hits", "saved", *COUNTED), 0) for kind in KINDS}
-        materials = scene.used_materials()
-        self.bounces = depth > 0 and any(m.reflects or m.refracts for m in materials)
-        self.transparent = any(m.transparent for m in materials)
-        self.coloured_shadows = self.transparent or any(m.refracts for m in materials)
-        lights = [light for light in scene.lights if any(light.colour)]
-        self.lights = [
-            (light, 1.0 / n) for light in lights for n in (light_samples if light.has_extent else 1,) for _ in range(n)
-        ]
-        self.rounding = ROUNDING * np.abs(scene.bounds()).max() if "shadow" in structures else 0.0
-        self.soft = (samples > 1 or light_samples > 1) and any(light.has_extent for light in lights)
 
     def tile(self, x0, y0, x1, y1, sample):
-        """One sample of every pixel with x0 <= x < x1, y0 <= y < y1.
+        """Samples of every pixel with x0 <= x < x1, y0 <= y < y1: the one with a number, or those of a range.
 
         Returns
         -------
         dict
-            Arrays with one entry a pixel, row by row from the bottom: ``combined`` (n, 3), ``rays_per_pixel``, ``n_it``
-            and ``n_ts`` where counted; for sample 0 also ``depth``, ``normal``, ``position``, ``object_index`` and
-            ``primitive_index``.
+            Arrays with one entry a pixel, row by row from the bottom: ``combined`` (n, 3), the mean of the samples;
+            the sums ``rays_per_pixel``, ``n_it`` and ``n_ts`` where counted; for sample 0 also ``depth``, ``normal``,
+            ``position``, ``object_index`` and ``primitive_index``.
         """
-        return self.sampled((np.arange(y0, y1)[:, None] * self.size[0] + np.arange(x0, x1)).ravel(), sample)
+        pixels = (np.arange(y0, y1)[:, None] * self.size[0] + np.arange(x0, x1)).ravel()
+        if not isinstance(sample, range):
+            return self.sampled(pixels, sample)
+        n = len(sample)
+        out = self.sampled(np.tile(pixels, n), np.repeat(sample, len(pixels)))
+        out = {name: value.reshape(n, len(pixels), *value.shape[1:]).sum(axis=0) for name, value in out.items()}
+        out["combined"] /= n
+        return out
 
     def sampled(self, pixels, sample):
         """Samples of pixels y * width + x, which may occur more than once, and what :meth:`tile` returns of them.
 
         `sample` is the number of the sample, for all or one each.
         """
-        key = sampling.first_key(pixels, sample, self.seed) if self.samples > 1 or self.soft or self.roulette else None
+        key = None
+        if self.samples > 1 or self.soft or self.roulette:
+            key = sampling.first_key(pixels, sample, self.seed, self.stratified)
         o, d = primary(self.scene.camera, self.size, pixels, key if self.samples > 1 else None)
         return self.traced(o, d, key, not np.any(sample))
 
@@ -198,7 +135,7 @@ class Whitted:
         self.per_pixel = {
             name: np.zeros(n, np.int64) for name in ("rays_per_pixel", *(("n_it", "n_ts") if self.count else ()))
         }
-        stack, out = [wave], {}
+        stack, out, self.waiting = [wave], {}, {}
         while stack:
             wave, hits = self._met(self._next(stack))
             met = np.flatnonzero(hits.primitive >= 0)
@@ -208,6 +145,9 @@ class Whitted:
                 out["combined"] = None
             self._shade(wave, hits, met, surface)
             stack += self._onward(wave, hits, met, surface)
+        for probe in list(self.waiting):
+            self._add_waiting(probe)
+        self.waiting = None
         out["combined"] = self.radiance.T
         out.update(self.per_pixel)
         return out
@@ -274,22 +214,34 @@ class Whitted:
         if not len(met):
             return
         table, m = self.surfaces.table, surface.material
-        seen = table.emission[:, m] + self.ambient[:, None] * (table.ambient[m] * surface.base)
+        pixel, weight = wave.pixel[met], wave.weight[:, met] * surface.alpha
+        self._add(pixel, weight * (table.emission[:, m] + self.ambient[:, None] * (table.ambient[m] * surface.base)))
         if self.lights:
-            from .shading import lit
+            self._add_light(surface, wave.d[:, met], wave.key[met] if self.soft else None, pixel, weight)
 
-            key = wave.key[met] if self.soft else None
-            pixel = wave.pixel[met]
-            seen += lit(
-                table,
-                surface,
-                wave.d[:, met],
-                self.lights,
-                lambda s, which, to, reach, light: self._transmitted(s, which, to, reach, light, pixel),
-                key,
-                self.check,
-            )
-        self._add(wave.pixel[met], wave.weight[:, met] * surface.alpha * seen)
+    def _add_light(self, surface, d, key, pixel, weight):
+        """Add what surfaces reflect of the lights, or let it wait until there are shadow rays enough."""
+        from .shading import by_light
+
+        # A tracer with a way of its own to ask about light asks at once.
+        waits = self.waiting is not None and type(self)._transmitted is Whitted._transmitted
+        for light, which, to, reach, seen in by_light(self.surfaces.table, surface, d, self.lights, key, self.check):
+            own, seen = pixel[which], weight[:, which] * seen
+            if light.shadows and waits:
+                probe = self._towards(light)
+                rays = self.waiting.setdefault(probe, [])
+                rays.append((*self._shadow_rays(surface, which, to, reach), own, seen))
+                if sum(len(r[-2]) for r in rays) >= WAVE:
+                    self._add_waiting(probe)
+                continue
+            if light.shadows:
+                seen = seen * self._transmitted(surface, which, to, reach, light, pixel)
+            self._add(own, seen)
+
+    def _add_waiting(self, probe):
+        """Add the light of the shadow rays that wait for one structure."""
+        *rays, pixel, seen = (np.concatenate(a, axis=-1) for a in zip(*self.waiting.pop(probe)))
+        self._add(pixel, seen * self._through(probe, *rays, pixel))
 
     def _add(self, pixel, radiance):
         """Sum radiance into the pixels."""
@@ -311,17 +263,22 @@ class Whitted:
         return colour * surroundings(world.image, d)
 
     def _transmitted(self, surface, which, to, reach, light, pixel):
-        """Share of a light that reaches the surfaces `which` from where `to` points; the shadow rays."""
-        probe = self._towards(light)
+        """Share of a light that reaches the surfaces `which` from where `to` points."""
+        return self._through(self._towards(light), *self._shadow_rays(surface, which, to, reach), pixel[which])
+
+    def _shadow_rays(self, surface, which, to, reach):
+        """Shadow rays from the surfaces `which`: o, d, how far they go, what they leave."""
         point = surface.point[:, which]
         o = pushed(point, surface.error[which], surface.normal[:, which], to)
-        d = to
-        if math.isfinite(reach):
-            # The ray starts beside the point, and must still end at the light.
-            # A surface that the light lies in does not shade it.
-            d = to + (point - o)
-            reach = np.maximum(1.0 - self.rounding / np.abs(d).max(axis=0), 0.0)
-        pixel, leaving = pixel[which], surface.place[:, which]
+        if math.isinf(reach):
+            return o, to, np.full(len(which), math.inf), surface.place[:, which]
+        # The ray starts beside the point, and must still end at the light.
+        # A surface that the light lies in does not shade it.
+        d = to + (point - o)
+        return o, d, np.maximum(1.0 - self.rounding / np.abs(d).max(axis=0), 0.0), surface.place[:, which]
+
+    def _through(self, probe, o, d, reach, leaving, pixel):
+        """Share of light that comes through along shadow rays, shape (n,) or (3, n)."""
         if not self.coloured_shadows:
             blocked, counts = probe.occluded(o, d, reach, leaving)
             self._count(SHADOW, pixel, np.count_nonzero(blocked), counts)

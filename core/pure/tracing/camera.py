@@ -1,6 +1,6 @@
 """Primary rays: where they pass through the picture, and where they start."""
 
-from .sampling import PIXEL, number
+from .sampling import PIXEL, pair
 from .vectors import add, times
 
 
@@ -21,7 +21,7 @@ def primary(camera, size, x, y, key):
     origin, direction : tuple of 3 float
         The direction has length 1 along the viewing axis.
     """
-    dx, dy = (0.5, 0.5) if key is None else (number(key, PIXEL), number(key, PIXEL + 1))
+    dx, dy = (0.5, 0.5) if key is None else pair(key, PIXEL)
     return through(camera, size, x + dx, y + dy)
 
 

@@ -3,8 +3,6 @@
 from ..ray import Ray
 from ..watch import Counter
 
-COUNTED = ("n_it", "n_ts", "n_ets", "n_eets")
-
 
 class Probe:
     """One structure, as the tracer asks it.

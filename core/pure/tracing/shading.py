@@ -3,7 +3,7 @@
 import math
 
 from .lights import arriving
-from .sampling import LIGHTS, number
+from .sampling import LIGHTS, pair
 from .vectors import add, dot, minus, mul, times, unit
 
 
@@ -18,7 +18,8 @@ def lit(surface, d, lights, transmitted, key):
     lights : list of (Light, float)
         Each with the share of it that is to be added: a light that is sampled n times is there n times, by 1 / n.
     transmitted : callable
-        ``transmitted(surface, to, reach, light)``: the share of light, a colour, that comes through to the surface from `to`.
+        ``transmitted(surface, to, reach, light)``: the share of light, a colour, that comes through to the surface
+        from `to`.
     key : int or None
         Key of the ray, where lights have an extent to be sampled.
 
@@ -30,8 +31,10 @@ def lit(surface, d, lights, transmitted, key):
     total = (0.0, 0.0, 0.0)
     view = unit(d)
     material, base, normal = surface.material, surface.base, surface.shading
+    first, before = 0, None
     for k, (light, share) in enumerate(lights):
-        u, v = (None, None) if key is None else (number(key, LIGHTS + 2 * k), number(key, LIGHTS + 2 * k + 1))
+        first, before = (first if light is before else k), light
+        u, v = (None, None) if key is None else pair(key, LIGHTS + first, round(1.0 / share), k - first)
         to, reach, towards, irradiance = arriving(light, surface.point, u, v)
         cosine = dot(normal, towards)
         flat = dot(surface.normal, towards)

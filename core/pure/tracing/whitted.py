@@ -10,19 +10,12 @@ Modules for lights, glass, mirrors and textures are imported only for a scene th
 import math
 from dataclasses import dataclass
 
+from ...tracer import COUNTED, KINDS, PRIMARY, REFLECTED, REFRACTED, SHADOW, TRANSPARENT, Tracer
 from . import sampling
 from .camera import primary
-from .probe import COUNTED, Probe
+from .probe import Probe
 from .surface import Surfaces
 from .vectors import add, dot, minus, mul, pushed, times, unit
-
-#: Rounding of positions on rays, relative to the scene's largest coordinate.
-ROUNDING = 32 * 2.0**-52
-#: Side of the tiles that the picture is made in.
-TILE = 16
-
-PRIMARY, REFLECTED, REFRACTED, TRANSPARENT, SHADOW = range(5)
-KINDS = ("primary", "reflected", "refracted", "transparent", "shadow")
 
 
 @dataclass(slots=True)
@@ -55,89 +48,16 @@ class Path:
     leaving: tuple | None = None
 
 
-class Whitted:
-    """The tracer of one picture.
+class Whitted(Tracer):
+    """See :class:`~rayscope.core.tracer.Tracer`."""
 
-    Parameters
-    ----------
-    scene : Scene
-    structures : dict
-        ``primary``, ``secondary``, ``shadow``: the structure that answers each kind of ray.
-    size : (int, int)
-    depth : int
-        Reflections and refractions in a row, at most (H).
-    samples : int
-        Samples a pixel that the picture will have.
-    seed : int
-    count : bool
-        Also count intersection tests and traversal steps.
-    check : callable
-        Called without arguments every few ten milliseconds; may raise Cancelled.
-    threshold : float
-        Dynamic recursion control: a ray whose weight in its pixel is less, in every colour, is not traced (Hall and
-        Greenberg 1983).
-    roulette : bool
-        Such a ray is traced with the probability weight / threshold, and then weighs `threshold` (Arvo and Kirk 1990):
-        noise, where leaving it out makes the picture too dark.
-    light_samples : int
-        Shadow rays to each light that has an extent.
+    tile_side = 16
 
-    Attributes
-    ----------
-    tally : dict
-        Per kind of ray: rays, hits, n_it, n_ts, n_ets, n_eets, and saved: rays not traced for their small weight.
-    antialiases : bool
-        Whether one sample a pixel is the whole picture.
-    notices : sequence of Notice
-        What cannot be done as asked.
-    """
-
-    tile_side = TILE
-    antialiases = False
-    notices = ()
-
-    def __init__(
-        self,
-        scene,
-        structures,
-        size,
-        depth,
-        samples,
-        seed,
-        count,
-        check,
-        threshold=0.0,
-        roulette=False,
-        light_samples=1,
-    ):
-        self.scene, self.size, self.depth, self.samples, self.seed, self.count = (
-            scene,
-            size,
-            depth,
-            samples,
-            seed,
-            count,
-        )
-        self.check, self.threshold, self.roulette = check, threshold, roulette and threshold > 0.0
+    def __init__(self, scene, structures, size, options, count, check):
+        super().__init__(scene, structures, size, options, count, check)
         self.probe = {kind: Probe(s, count) for kind, s in structures.items()}
-        self.to_light = {}
         self.surfaces = Surfaces(scene)
         self.ambient = scene.world.ambient_light()
-        self.tally = {kind: dict.fromkeys(("rays", "hits", "saved", *COUNTED), 0) for kind in KINDS}
-        materials = scene.used_materials()
-        self.bounces = depth > 0 and any(m.reflects for m in materials)
-        self.transparent = any(m.transparent for m in materials)
-        self.coloured_shadows = self.transparent or any(m.refracts for m in materials)
-        lights = [light for light in scene.lights if any(light.colour)]
-        self.lights = [
-            (light, 1.0 / n) for light in lights for n in (light_samples if light.has_extent else 1,) for _ in range(n)
-        ]
-        self.rounding = (
-            ROUNDING * max(abs(x) for corner in scene.bounds() for x in corner.tolist())
-            if "shadow" in structures
-            else 0.0
-        )
-        self.soft = (samples > 1 or light_samples > 1) and any(light.has_extent for light in lights)
 
     def tile(self, x0, y0, x1, y1, sample):
         """One sample of every pixel with x0 <= x < x1, y0 <= y < y1.
@@ -160,7 +80,7 @@ class Whitted:
         """One sample of a pixel; what it returns is named as in :meth:`tile`."""
         random = self.samples > 1
         key = (
-            sampling.first_key(y * self.size[0] + x, sample, self.seed)
+            sampling.first_key(y * self.size[0] + x, sample, self.seed, self.stratified)
             if random or self.soft or self.roulette
             else None
         )
