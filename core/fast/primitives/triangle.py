@@ -9,6 +9,7 @@ import numpy as np
 
 from ...scene.exact import DOUBTFUL, collinear
 from ...scene.layout import mirrors, to_world
+from .cut import boxes_inside
 from .exact_edges import edge_functions
 
 #: gamma(7): relative error of a point interpolated from three vertices (Pharr et al., PBR 4th ed., 6.8.5).
@@ -238,24 +239,11 @@ class Triangles:
 
     def clip(self, item, lo, hi):
         """Boxes of the parts of triangles inside boxes (Sutherland and Hodgman 1974), all pairs at once."""
-        m = len(item)
-        polygon = np.zeros((9, 3, m))
-        corners = polygon[:3] = self.xyz[:, item].reshape(3, 3, m)
-        count = np.full(m, 3)
+        corners = np.stack(self.rows(item)).reshape(3, 3, -1)
         slack = 8 * 2.0**-53 * np.maximum(np.abs(lo), np.abs(hi)).max(axis=1, initial=0.0)
-        slack = np.maximum(slack, 8 * 2.0**-53 * np.abs(polygon[:3]).max(axis=(0, 1), initial=0.0))
-        for axis in range(3):
-            for sign, limit in ((1.0, lo[:, axis] - slack), (-1.0, -hi[:, axis] - slack)):
-                # Few planes cut a triangle; what is left of it is nowhere beyond its corners.
-                cut = np.flatnonzero((sign * corners[:, axis] < limit).any(axis=0))
-                if len(cut):
-                    polygon[:, :, cut], count[cut] = _clip_plane(
-                        polygon[:, :, cut], count[cut], axis, sign, limit[cut]
-                    )
-        used = (np.arange(9)[:, None] < count)[:, None, :]
-        own_lo = np.where(used, polygon, np.inf).min(axis=0).T - slack[:, None]
-        own_hi = np.where(used, polygon, -np.inf).max(axis=0).T + slack[:, None]
-        return np.maximum(own_lo, lo), np.minimum(own_hi, hi)
+        slack = np.maximum(slack, 8 * 2.0**-53 * np.abs(corners).max(axis=(0, 1), initial=0.0))
+        own_lo, own_hi = boxes_inside(corners, lo.T - slack, hi.T + slack)
+        return np.maximum((own_lo - slack).T, lo), np.minimum((own_hi + slack).T, hi)
 
     def support(self, item, axis):
         """Exact extents (d, D) along the directions `axis`, shape (m, 3)."""
@@ -294,32 +282,3 @@ def normals(rows, flip=None):
         length[flip] *= -1.0
     normal /= length
     return normal
-
-
-def _clip_plane(polygon, count, axis, sign, limit):
-    """Keep the parts of convex polygons with sign * x[axis] >= limit.
-
-    `polygon` is (9, 3, m) with `count` (m,) corners used; a triangle cut by six planes has at most nine.
-    """
-    corners, _, m = polygon.shape
-    out = np.zeros_like(polygon)
-    out_count = np.zeros(m, np.int64)
-    columns = np.arange(m)
-    for k in range(corners):
-        live = k < count
-        if not live.any():
-            break
-        here = polygon[k]
-        following = polygon[np.where(k + 1 < count, k + 1, 0), :, columns].T
-        d0, d1 = sign * here[axis] - limit, sign * following[axis] - limit
-        keep = np.flatnonzero(live & (d0 >= 0.0))
-        out[out_count[keep], :, keep] = here[:, keep].T
-        out_count[keep] += 1
-        cross = np.flatnonzero(live & ((d0 >= 0.0) != (d1 >= 0.0)))
-        if len(cross):
-            f = d0[cross] / (d0[cross] - d1[cross])
-            point = here[:, cross] + f * (following[:, cross] - here[:, cross])
-            point[axis] = sign * limit[cross]
-            out[out_count[cross], :, cross] = point.T
-            out_count[cross] += 1
-    return out, out_count
