@@ -100,7 +100,7 @@ MAX_BYTES = Parameter("max_bytes", 64e6, "With stop = memory: cells are divided 
 WALK = Parameter("walk", "depth-first", "Which of the nodes that wait a ray enters next: the nearest child; the nearest of all, from a heap",
                  choices=("depth-first", "best-first"))
 
-FALLBACK = Parameter("samples", 16, "Rays in place of one that reaches a primitive which cannot be tested as a whole", low=1, high=1024)
+FALLBACK = Parameter("samples", 16, "Rays that a pixel is worth where a primitive cannot be tested as a whole; what weighs less gets fewer", low=1, high=1024)
 
 OTHER_TESTS = ("moller-trumbore", "badouel", "baldwin-weber", "plucker")
 

@@ -2,6 +2,10 @@
 
 from ..errors import Notice
 
+#: What is worth no more than so much of a ray is not looked at as a whole, and of pieces worth less some are left out.
+SMALL = 0.25
+#: Cones that reach more primitives than this are sampled, which is less work.
+MANY = 256
 #: The triangles' areas add up to the polygon's but for so much of it, or the polygon crosses itself.
 TOLERANCE = 1e-9
 

@@ -12,7 +12,7 @@ from rayscope.core.fast.generalised.cone import Cones, Reach
 from rayscope.core.fast.generalised.outlines import points
 from rayscope.core.fast.generalised.cones_tracer import scattering
 
-from .footprint_scenes import displayed, lit, rmse, with_area, with_cylinder, with_glass, with_mesh
+from .footprint_scenes import ball_mesh, displayed, lit, rmse, with_area, with_cylinder, with_glass, with_mesh
 
 pytestmark = pytest.mark.slow
 
@@ -65,6 +65,19 @@ def test_soft_shadows_of_a_spherical_light_cost_less_than_8_shadow_rays(radius):
     assert rmse(result.image, exact.image) < 0.02
     assert np.sqrt(np.mean((result.image - exact.image) ** 2)) < 0.02
     assert sorted(ratios)[1] <= 1.0, ratios
+
+
+def test_many_small_triangles_seen_by_wide_cones_cost_about_16_samples():
+    scene, size = rough_floor(detail=(40, 64)), (48, 36)
+    rays, cones = build(scene, "bvh"), build(scene, "cones")
+
+    def timed(**options):
+        begin = time.process_time()
+        trace(scene, size=size, depth=2, **options)
+        return time.process_time() - begin
+
+    ratios = [timed(index=cones) / timed(index=rays, samples=16) for _ in range(3)]
+    assert sorted(ratios)[1] <= 3.0, ratios               # it was 12 before such cones were sampled
 
 
 def random_cones(rng, n, disc):
@@ -211,6 +224,82 @@ def test_neighbours_let_nothing_through(core):
     assert inside.sum() >= 4 and np.abs(image[inside] - 1.0).max() < 1e-6
     share = np.isfinite(depth).mean(axis=(1, 3))
     assert np.abs(image - share).max() < 0.05 and image[outside].max() < 0.03
+
+
+def rough_floor(roughness=0.4, detail=(10, 16)):
+    """A ball of many triangles over a floor that mirrors roughly."""
+    scene = with_mesh()
+    objects = [
+        Object("ball", ball_mesh(*detail), materials=(Material("b", (0.9, 0.4, 0.2)),)),
+        Object("floor", scene.objects[0].geometry, materials=(Material("f", (0.3, 0.3, 0.3), mirror=0.6, roughness=roughness),)),
+    ]
+    light = Light("lamp", "point", (50, 50, 50), (3, -3, 4), radius=0.4)
+    return Scene(objects, [light], Camera.look_at((0, -4, 2), (0, 0, 0.3), angle=0.7, aspect=4 / 3), World((0.2, 0.3, 0.5)))
+
+
+def test_few_pieces_stand_for_many():
+    """Wide cones see most of a ball's 320 triangles: both cores choose the same ones, and the mean is that of all."""
+    scene, size = rough_floor(), (8, 6)
+    fast, pure = (trace(scene, "cones", core, size, 1) for core in ("fast", "pure"))
+    assert np.abs(fast.image - pure.image).max() < 1e-6
+    assert fast.figures["shadow"]["rays"] == pure.figures["shadow"]["rays"]
+    everything, chosen = build(scene, "cones", samples=1024), build(scene, "cones", samples=2)
+    exact = trace(scene, index=everything, size=size, depth=1)
+    runs = [trace(scene, index=chosen, size=size, depth=1, seed=seed) for seed in range(40)]
+    assert runs[0].figures["shadow"]["rays"] < 0.4 * exact.figures["shadow"]["rays"]
+    mean, spread = (f([r.image[..., :3] for r in runs], axis=0) for f in (np.mean, np.std))
+    off = np.abs(mean - exact.image[..., :3])
+    assert spread.max() > 0.005 and (off > 5.0 * spread / math.sqrt(len(runs)) + 0.004).mean() < 0.01
+    assert abs((mean - exact.image[..., :3]).mean()) < 5e-4
+
+
+@pytest.mark.parametrize("core", ["fast", "pure"])
+def test_cones_that_reach_a_crowd_are_sampled(core):
+    scene, size = rough_floor(detail=(14, 24)), (6, 4)
+    whole, crowd = (trace(rough_floor(detail=d), "cones", core, size, 1, count=True) for d in ((3, 6), (14, 24)))
+    assert crowd.figures["reflected"]["rays"] > 3 * whole.figures["reflected"]["rays"]
+    assert crowd.figures["reflected"]["rays"] <= 24 * 65
+    if core == "pure":
+        fast = trace(scene, "cones", "fast", size, 1)
+        assert np.abs(fast.image - crowd.image).max() < 1e-6
+    assert np.abs(crowd.image - trace(scene, size=size, depth=1, samples=64).image).mean() < 0.05
+
+
+def hall():
+    """Two mirrors that face each other, a column between that no cone can be tested against."""
+    mirror = Material("mirror", diffuse=0.1, mirror=1.0)
+    panes = [
+        Object(f"pane{x}", Mesh(np.array([(x, -9, -9), (x, 9, -9), (x, 0, 20)], float), [(0, 1, 2)]), materials=(mirror,))
+        for x in (-1.5, 1.5)
+    ]
+    light = Light("lamp", "point", (9, 9, 9), (0, -1, 1.5), radius=0.2)
+    camera = Camera.look_at((0.9, -2, 0.3), (-1.5, 0.5, 0), angle=0.9)
+    return Scene(panes, [light], camera, World((0.3, 0.4, 0.6)), solids=[solids.cylinder((0, 0, -2), (0, 0, 2), 0.3)])
+
+
+@pytest.mark.parametrize("core", ["fast", "pure"])
+def test_what_cannot_be_tested_does_not_make_rays_grow_with_depth(core):
+    """Sixteen rays a pixel, and no more however often they are reflected; not sixteen more at every mirror."""
+    size, deep = (4, 4), 6
+    cones = {depth: trace(hall(), "cones", core, size, depth).figures for depth in (1, deep)}
+    rays = {depth: figures["reflected"]["rays"] for depth, figures in cones.items()}
+    assert rays[1] > 16 and rays[deep] <= deep * 2 * 16 * 16
+    assert cones[deep]["shadow"]["rays"] <= (deep + 1) * 2 * 16 * 16
+
+
+def test_rays_in_place_of_cones_see_the_mean_over_them():
+    """Whether a pixel is worth two rays or a thousand: solids alone, so that all is sampled."""
+    mirror = (Material("mirror", diffuse=0.5, mirror=0.8),)
+    cans = Scene(solids=[solids.cylinder((x, 0.2, -2), (x, 0, 2), 0.4) for x in (-0.7, 0.0, 0.7)]).objects[0].geometry
+    light = Light("lamp", "point", (9, 9, 9), (0.5, -2, 1.5), radius=0.4)
+    scene = Scene([Object("cans", cans, materials=mirror)], [light], Camera.look_at((0, -3, 0.3), (0, 0, 0), angle=0.7), World((0.3, 0.4, 0.6)))
+    size = (4, 4)
+    few, many = (build(scene, "cones", samples=n) for n in (2, 1024))
+    exact = trace(scene, index=many, size=size, depth=3).image[..., :3]
+    runs = [trace(scene, index=few, size=size, depth=3, seed=seed).image[..., :3] for seed in range(50)]
+    mean, spread = np.mean(runs, axis=0), np.std(runs, axis=0) / math.sqrt(len(runs))
+    assert spread.max() > 0.01 and (np.abs(mean - exact) < 4.0 * spread + 0.01).all()
+    assert abs((mean - exact).mean()) < 3.0 * spread.mean() / 4.0
 
 
 @pytest.mark.parametrize("core", ["fast", "pure"])

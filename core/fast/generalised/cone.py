@@ -77,11 +77,15 @@ class Cones:
         parallel = self.parallel[cone]
         return self.o[:, cone] + np.where(parallel, shift, 0.0), self.d[:, cone] + np.where(parallel, 0.0, shift)
 
-    def height(self, cone, point):
-        """How far points, one for each of the cones given, lie beyond the planes that these leave; in them, 0."""
-        p, away = point - self.start[:, cone], self.away[:, cone]
-        height = dot(away, p)
-        return np.where(np.abs(height) > FLAT * np.abs(p).max(axis=0, initial=0.0), height, 0.0)
+    def heights(self, cone, points):
+        """How far points lie beyond the planes that the cones given leave; in them, 0. A list of such as a list of points."""
+        start, (a, b, c) = self.start[:, cone], self.away[:, cone]
+        out = []
+        for x, y, z in (point - start for point in points):
+            height = a * x + b * y + c * z
+            size = np.maximum(np.maximum(np.abs(x), np.abs(y)), np.abs(z))
+            out.append(np.where(np.abs(height) > FLAT * size, height, 0.0))
+        return out
 
     def spread(self):
         """How far points of the cones are from their axes, along x, y and z, at most: at w = 0, and more for each w."""
@@ -119,7 +123,7 @@ class Reach:
         return np.flatnonzero(near <= far)
 
 
-def meeting(tree, tree_boxes, boxes, cones):
+def meeting(tree, tree_boxes, boxes, cones, most):
     """Which primitives' boxes cones reach into.
 
     Parameters
@@ -128,35 +132,46 @@ def meeting(tree, tree_boxes, boxes, cones):
     tree_boxes, boxes : (ndarray, ndarray)
         World boxes lo, hi, of shape (3, m), of its nodes, and of the primitives.
     cones : Cones
+    most : float
+        Cones that reach into more are given up.
 
     Returns
     -------
     cone, item : ndarray
-        Pairs of cones and primitives, by ascending cone, then item.
+        Pairs of cones and primitives, by ascending cone, then item; of the cones given up, none.
+    met : ndarray, shape (n,)
+        Boxes of primitives that each cone reaches into; of those given up, some number above `most`.
     visited : ndarray, shape (n,)
         Nodes entered by each cone.
     """
     n, reach = len(cones), Reach(cones)
-    visited = np.zeros(n, np.int64)
+    visited, met = np.zeros(n, np.int64), np.zeros(n, np.int64)
     cone, node = np.arange(n), np.full(n, tree.root, np.int64)
-    pairs = [(cone[:0], node[:0])]
+    pairs = [(cone[:0], cone[:0])]
     while len(cone):
         some = reach.met(cone, *tree_boxes, node)
         cone, node = cone.take(some), node.take(some)
         visited += np.bincount(cone, minlength=n)
         inner = tree.left.take(node) >= 0
         leaf = np.flatnonzero(~inner)
-        pairs.append((cone.take(leaf), node.take(leaf)))
+        if len(leaf):
+            count = tree.count.take(node.take(leaf)).astype(np.int64)
+            first = tree.first.take(node.take(leaf)) - (np.cumsum(count) - count)
+            own, item = np.repeat(cone.take(leaf), count), tree.order[np.repeat(first, count) + np.arange(count.sum())]
+            some = reach.met(own, *boxes, item)
+            own, item = own.take(some), item.take(some)
+            met += np.bincount(own, minlength=n)
+            pairs.append((own, item))
         inner = np.flatnonzero(inner)
         cone, node = cone.take(inner), node.take(inner)
+        if (met > most).any():
+            left = np.flatnonzero(met[cone] <= most)
+            cone, node = cone[left], node[left]
         cone = np.concatenate([cone, cone])
         node = np.concatenate([tree.left.take(node), tree.right.take(node)]).astype(np.int64)
-    cone, leaf = (np.concatenate(c) for c in zip(*pairs))
-    count = tree.count.take(leaf).astype(np.int64)
-    ends = np.cumsum(count)
-    item = tree.order[np.repeat(tree.first.take(leaf) - (ends - count), count) + np.arange(count.sum())]
-    cone = np.repeat(cone, count)
-    some = reach.met(cone, *boxes, item)
-    cone, item = cone[some], item[some]
+    cone, item = (np.concatenate(c) for c in zip(*pairs))
+    if (met > most).any():
+        left = np.flatnonzero(met[cone] <= most)
+        cone, item = cone[left], item[left]
     order = np.lexsort((item, cone))
-    return cone[order], item[order], visited
+    return cone[order], item[order], met, visited

@@ -2,6 +2,10 @@
 
 One cone a pixel antialiases; a cone to a light tells which share of it is hidden; reflected and refracted cones are as
 wide as surfaces bend and scatter them.
+
+A wide cone sees hundreds of small pieces, and each would be shaded, need shadows and send on cones. Of those that weigh
+little in the pixel some are therefore chosen, at random, to stand for the others: the expected value is the same. What
+weighs less than a ray (see :mod:`.footprint_tracer`) has shadow rays instead of shadow cones.
 """
 
 import math
@@ -10,12 +14,14 @@ from dataclasses import replace
 import numpy as np
 
 from ...hits import Hits
+from ...scene.footprints import SMALL
+from ..tracing import sampling
 from ..tracing.vectors import dot, frame, pushed, unit
 from ..tracing.whitted import COUNTED, REFLECTED, SHADOW, TRANSPARENT
 from .cone import Cones
-from .footprint_tracer import CHUNK, ConeWave, FootprintTracer
+from .footprint_tracer import ConeWave, FootprintTracer
 from .footprints import FootprintTree
-from .outlines import points
+from .outlines import points, scattered
 
 #: Cones that widen less than by their width along so many times the scene's size are taken as parallel.
 PARALLEL = 1e4
@@ -52,13 +58,17 @@ class ConeTracer(FootprintTracer):
             self.soft = False
             self.lights = [(light, 1.0) for light in scene.lights if any(light.colour)]
 
-    def visible(self, outlines):
+    def visible(self, outlines, wave):
         """See :class:`FootprintTracer`.
 
         What hides what is judged at points of the aperture, as in the A-buffer (Carpenter 1984).
         """
         share, s, t = outlines.share.copy(), outlines.s.copy(), outlines.t.copy()
-        rows, start, group = _groups(outlines.cone)
+        beaten = self._beaten(outlines)
+        share[beaten] = 0.0
+        left = np.flatnonzero(~beaten)
+        rows, start, group = _groups(outlines.cone[left])
+        rows = left[rows]
         if not len(rows):
             return share, s, t
         own = outlines.take(rows)
@@ -67,14 +77,20 @@ class ConeTracer(FootprintTracer):
         nearest = np.minimum.reduceat(w, start, axis=0)
         covers = w < np.inf
         wins = covers & (w == nearest[group])
-        ties = np.add.reduceat(wins, start, axis=0, dtype=np.int64)
-        credit = wins / np.maximum(ties, 1)[group]
-        won, covered = credit.sum(axis=1), covers.sum(axis=1)
+        ties = np.add.reduceat(wins, start, axis=0, dtype=np.int16)
+        won, covered = wins.sum(axis=1), covers.sum(axis=1)
+        credit = wins
+        if (ties > 1).any():
+            credit = wins / np.maximum(ties, 1)[group]
+            won = credit.sum(axis=1)
         # What lies between the points is in front, or not, where it is nearest to one.
-        here = own.distances(own.s[:, None], own.t[:, None])[:, 0]
-        at = ((own.s[:, None] - ps) ** 2 + (own.t[:, None] - pt) ** 2).argmin(axis=1)
-        slips = np.where(here < nearest[group, at], 1.0, 0.0)
-        part = np.where(covered > 0, won / np.maximum(covered, 1), slips)
+        part = won / np.maximum(covered, 1)
+        slips = np.flatnonzero(covered == 0)
+        if len(slips):
+            some = own.take(slips)
+            here = some.distances(some.s[:, None], some.t[:, None])[:, 0]
+            at = ((some.s[:, None] - ps) ** 2 + (some.t[:, None] - pt) ** 2).argmin(axis=1)
+            part[slips] = here < nearest[group[slips], at]
         seen = own.share * part
         total = np.add.reduceat(seen, start)
         full = (nearest < np.inf).all(axis=1)
@@ -82,24 +98,88 @@ class ConeTracer(FootprintTracer):
         seen = seen * scale[group]
         # Scraps at edges are left to the others, or rays behind surfaces would be followed for nothing.
         kept = np.where(seen >= SCRAP * np.maximum.reduceat(seen, start)[group], seen, 0.0)
-        share[rows] = kept * (np.add.reduceat(seen, start) / np.maximum(np.add.reduceat(kept, start), 1e-300))[group]
+        kept *= (np.add.reduceat(seen, start) / np.maximum(np.add.reduceat(kept, start), 1e-300))[group]
+        share[rows] = self._fewer(kept, group, wave.take(own.cone[start]))
         hidden = np.flatnonzero((part < 1.0) & (won > 0.0))
         s[rows[hidden]] = (credit[hidden] @ ps) / won[hidden]
         t[rows[hidden]] = (credit[hidden] @ pt) / won[hidden]
         return share, s, t
 
+    @staticmethod
+    def _beaten(outlines):
+        """Which pieces lie all behind another that covers the whole cone."""
+        near = outlines.nearness()
+        reach = np.hypot(near[0], near[1]) if outlines.cones.disc else np.abs(near[0]) + np.abs(near[1])
+        cone, full = outlines.cone[outlines.flat], outlines.share[outlines.flat] == 1.0
+        least = np.full(len(outlines.cones), -np.inf)
+        np.maximum.at(least, cone[full], (near[2] - reach)[full])
+        out = np.zeros(len(outlines), bool)
+        # Beyond rounding.
+        out[outlines.flat] = near[2] + reach < least[cone] - 1e-9 * np.abs(least[cone])
+        return out
+
+    def _fewer(self, share, group, wave):
+        """Shares of pieces where of those that weigh little only some are left: systematic sampling.
+
+        `wave` are the cones of the groups.
+        """
+        weight = wave.weight.max(axis=0)
+        least = SMALL / self.rays_each
+        small = np.flatnonzero((share > 0.0) & (share * weight[group] < least))
+        if not len(small):
+            return share
+        first = np.flatnonzero(np.diff(group[small], prepend=-1))
+        size = np.diff(first, append=len(small))
+        own = group[small[first]]
+        upto = np.cumsum(share[small])
+        total = np.diff(upto[first + size - 1], prepend=0.0)
+        number = np.ceil(total * weight[own] / least)
+        u = sampling.number(wave.key[own], 0)
+        upto -= np.repeat(upto[first] - share[small[first]], size)
+        after = upto * np.repeat(number / total, size) + np.repeat(u, size)
+        after[first + size - 1] = number + u
+        before = np.concatenate([[0.0], after[:-1]])
+        before[first] = u
+        out = share.copy()
+        out[small] = (np.floor(after) - np.floor(before)) * np.repeat(total / number, size)
+        return out
+
+    def _shade(self, wave, hits, met, surface):
+        self._lit = self.worth(wave.weight[:, met]), wave.key[met]
+        super()._shade(wave, hits, met, surface)
+
     def _transmitted(self, surface, which, to, reach, light, pixel):
         """Share of a light that reaches the surfaces; by one cone each to a light that has an extent."""
         if not (self.soft_cones and light.has_extent):
             return super()._transmitted(surface, which, to, reach, light, pixel)
-        parts = []
-        for i in range(0, len(which), CHUNK):
+        out = np.empty((3, len(which)) if self.coloured_shadows else len(which))
+        rays, pace = np.where(self._lit[0][which] <= 1.0, 1.0, 0.0), self.pace["shadow"]
+        whole = np.flatnonzero(rays == 0.0)
+        for some in pace.slices(len(whole)):
             self.check()
-            parts.append(self._open(surface, which[i : i + CHUNK], to[:, i : i + CHUNK], reach, light, pixel))
-        return np.concatenate(parts, axis=-1)
+            some = whole[some]
+            out[..., some], rays[some] = self._open(surface, which[some], to[:, some], reach, light, pixel, pace)
+        some = np.flatnonzero(rays)
+        if len(some):
+            out[..., some] = self._open_to_rays(surface, which[some], to[:, some], reach, light, pixel, rays[some])
+        return out
 
-    def _open(self, surface, which, to, reach, light, pixel):
-        """Share of a light that is not hidden; shape (n,), or (3, n) where shadows are coloured."""
+    def _open_to_rays(self, surface, which, to, reach, light, pixel, each):
+        """Share of a light that is not hidden, by rays: `each` times as many as the surfaces are worth."""
+        worth, key = (a[which] for a in self._lit)
+        number = np.maximum(np.ceil(worth * each), 1.0).astype(np.int64)
+        start = np.cumsum(number) - number
+        row = np.repeat(np.arange(len(which)), number)
+        dimension = sampling.LIGHTS + 2 * next(i for i, (l, _) in enumerate(self.lights) if l is light)
+        u, v = (sampling.number(key, dimension + i)[row] for i in (0, 1))
+        e, f, disc = _aperture(light, to)
+        s, t = scattered(disc, np.arange(len(row)) - start[row], number[row], u, v)
+        towards = to[:, row] + s * e[:, row] + t * f[:, row]
+        got = super()._transmitted(surface, which[row], towards, reach, light, pixel)
+        return np.add.reduceat(got, start, axis=-1) / number
+
+    def _open(self, surface, which, to, reach, light, pixel, pace):
+        """Share of a light that is not hidden, (n,), or (3, n) where shadows are coloured; and `sampled` of `within`."""
         n, structure = len(which), self.probe["shadow"].structure
         point = surface.point[:, which]
         o = pushed(point, surface.error[which], surface.normal[:, which], to)
@@ -107,16 +187,13 @@ class ConeTracer(FootprintTracer):
         if math.isfinite(reach):
             d = to + (point - o)
             t_max = np.maximum(1.0 - self.rounding / np.abs(d).max(axis=0), 0.0)
-        if light.kind == "area":
-            e, f = (np.repeat(np.array(a, float)[:, None], n, axis=1) for a in light.axes)
-        else:
-            e, f = (light.radius * a for a in frame(unit(to)))
+        e, f, disc = _aperture(light, to)
         cones = Cones(
             o, d, e, f, np.zeros(n), t_max, np.zeros(n, bool), point, surface.normal[:, which], surface.place[:, which],
-            ~surface.outside[which],
-            light.kind != "area" or light.shape == "ellipse",
+            ~surface.outside[which], disc,
         )
         outlines, sampled, n_it, n_ts = structure.within(cones)
+        pace.met(n, n_it.sum())
         if self.coloured_shadows:
             passes = self._passing(structure, outlines)
             opaque = ~passes.any(axis=0)
@@ -130,20 +207,12 @@ class ConeTracer(FootprintTracer):
         else:
             hidden = _united(outlines, n)
             light_share = 1.0 - hidden
-        some = np.flatnonzero(~sampled)
+        some = np.flatnonzero(sampled == 0.0)
         counts = {}
         if self.count:
             counts = dict.fromkeys(COUNTED, np.zeros(len(some), np.int64)) | {"n_it": n_it[some], "n_ts": n_ts[some]}
         self._count(SHADOW, pixel[which[some]], np.count_nonzero(hidden[some] > 0.0), counts)
-        if sampled.any():
-            rest = np.flatnonzero(sampled)
-            k = self.rays_each
-            s, t = np.tile(points(cones.disc, k), len(rest))
-            rays = np.repeat(rest, k)
-            towards = to[:, rays] + s * e[:, rays] + t * f[:, rays]
-            got = super()._transmitted(surface, which[rays], towards, reach, light, pixel)
-            light_share[..., rest] = got.reshape(*got.shape[:-1], len(rest), k).mean(axis=-1)
-        return light_share
+        return light_share, sampled
 
     def _passing(self, structure, outlines):
         """Share of light, shape (3, m), that passes through the pieces."""
@@ -248,17 +317,31 @@ def _groups(cone):
     return rows, start, np.repeat(np.arange(len(start)), size[several])
 
 
+def _aperture(light, to):
+    """What a light extends by to two sides, shape (3, n) each, seen along `to`; and whether it is round."""
+    if light.kind == "area":
+        e, f = (np.repeat(np.array(a, float)[:, None], to.shape[1], axis=1) for a in light.axes)
+        return e, f, light.shape == "ellipse"
+    return *(light.radius * a for a in frame(unit(to))), True
+
+
 def _united(outlines, n):
     """Share of n cones that pieces cover together: a point under k of them counts for 1 / k of each."""
-    rows, start, group = _groups(outlines.cone)
     hidden = np.bincount(outlines.cone, outlines.share, minlength=n)
+    full = np.zeros(n, bool)
+    full[outlines.cone[outlines.share == 1.0]] = True
+    hidden[full] = 1.0
+    left = np.flatnonzero(~full[outlines.cone])
+    rows, start, group = _groups(outlines.cone[left])
     if len(rows):
-        own = outlines.take(rows)
-        covers = own.distances(*points(outlines.cones.disc)) < np.inf
-        layers = np.add.reduceat(covers, start, axis=0, dtype=np.int64)
-        count = covers.sum(axis=1)
-        alone = (covers / np.maximum(layers, 1)[group]).sum(axis=1)
-        part = own.share * np.where(count > 0, alone / np.maximum(count, 1), 1.0)
+        own = outlines.take(left[rows])
+        covers = own.covers(*points(outlines.cones.disc))
+        layers = np.add.reduceat(covers, start, axis=0, dtype=np.int16)
+        part = own.share
+        if (layers > 1).any():
+            count = covers.sum(axis=1)
+            alone = (covers * (1.0 / np.maximum(layers, 1))[group]).sum(axis=1)
+            part = part * np.where(count > 0, alone / np.maximum(count, 1), 1.0)
         total = np.add.reduceat(part, start)
         hidden[own.cone[start]] = np.where((layers > 0).all(axis=1), 1.0, total)
     return np.minimum(hidden, 1.0)

@@ -2,20 +2,26 @@
 
 All else is Whitted's tracer: each visible piece is shaded, at its middle, as the hit of a ray that weighs as much as
 its share; what is left sees the surroundings.
+
+The parameter ``samples`` says how many rays a whole pixel is worth. A cone that reaches what cannot be tested as a whole
+becomes as many rays as its weight in the pixel is worth, at least one, spread over it at random. So does a cone that is
+worth a small part of a ray, and one that reaches a crowd of primitives, with more rays. The work in a pixel is bounded
+for that reason, however many surfaces rays are sent on by, and the expected value is the mean over the cone.
 """
 
 import numpy as np
 
 from ...hits import Hits
+from ...scene.footprints import SMALL
 from ..rays import Rays
 from ..tracing import sampling
 from ..tracing.whitted import COUNTED, PRIMARY, REFLECTED, REFRACTED, TRANSPARENT, Wave, Whitted
 from .cone import Cones
 from .footprints import FootprintTree
-from .outlines import points
+from .outlines import scattered
 
-#: Cones that are taken up together.
-CHUNK = 4096
+#: Pairs of cones and primitives that are looked at together, about.
+PAIRS = 32_768
 #: Background is seen where at least so much of a cone is left.
 LEFT = 1e-9
 
@@ -56,6 +62,30 @@ class ConeWave(Wave):
         )
 
 
+class Pace:
+    """Takes up so many cones at a time that they meet about PAIRS primitives.
+
+    Attributes
+    ----------
+    size : int
+    """
+
+    def __init__(self):
+        self.size = 512
+
+    def slices(self, n):
+        """Slices of n cones; :meth:`met` may be called between them."""
+        start = 0
+        while start < n:
+            stop = min(start + self.size, n)
+            yield slice(start, stop)
+            start = stop
+
+    def met(self, n, pairs):
+        """So many cones met so many primitives."""
+        self.size = int(np.clip(n * PAIRS / max(pairs, 1), self.size // 4, min(4 * self.size, PAIRS))) or 1
+
+
 class FootprintTracer(Whitted):
     """The tracer of one picture; parameters as of :class:`~rayscope.core.fast.tracing.whitted.Whitted`."""
 
@@ -68,11 +98,17 @@ class FootprintTracer(Whitted):
         super().__init__(scene, structures, *arguments, **more)
         self.rays_each = structures["primary"].parameters["samples"]
         self.notices = structures["primary"].notices
+        self.pace = {kind: Pace() for kind in self.probe}
+
+    def worth(self, weight):
+        """How many rays cones are worth that weigh so much in their pixels; `weight` has the shape (3, n)."""
+        # Just enough less that rounding makes no further ray.
+        return (1.0 - 1e-9) * self.rays_each * weight.max(axis=0)
 
     def sampled(self, pixels, sample):
         """See :class:`Whitted`."""
         n, camera = len(pixels), self.scene.camera
-        key = sampling.first_key(pixels, sample, self.seed) if self.soft or self.roulette else None
+        key = sampling.first_key(pixels, sample, self.seed)
         y, x = np.divmod(pixels, self.size[0])
         o, d = (a.T for a in camera.rays(x + 0.5, y + 0.5, self.size))
         # Half a pixel to the right and upwards; of a disc, as much as has the pixel's area.
@@ -89,46 +125,63 @@ class FootprintTracer(Whitted):
         return self.followed(wave, n, not np.any(sample))
 
     def _met(self, wave):
-        """Each cone becomes a ray to each piece that it sees, and one to the background."""
-        probe = self.probe["primary" if wave.kind[0] == PRIMARY else "secondary"]
-        parts = [
-            self._seen(probe.structure, wave.take(slice(i, i + CHUNK)) if len(wave) > CHUNK else wave)
-            for i in range(0, len(wave), CHUNK)
-        ]
-        hits = {name: np.concatenate([h[name] for _, h in parts]) for name in _misses(0)}
-        return ConeWave.joined([w for w, _ in parts]), Hits(**hits)
-
-    def _seen(self, structure, wave):
-        """What the cones of a wave see: the rays to it, and the fields of their Hits."""
-        self.check()
+        """Each cone becomes a ray to each piece that it sees, and one to the background; or rays."""
+        first = wave.kind[0] == PRIMARY
+        kind = "primary" if first else "secondary"
+        structure, pace = self.probe[kind].structure, self.pace[kind]
         if not isinstance(structure, FootprintTree):
             wave = _rays(wave)
-            return wave, self._closest_of(wave)
-        n = len(wave)
-        cones = wave.cones
-        outlines, sampled, n_it, n_ts = structure.within(cones)
-        visible, s, t = self.visible(outlines)
-        seen = np.flatnonzero(visible > 0.0)
-        outlines, visible, s, t = outlines.take(seen), visible[seen], s[seen], t[seen]
-        found, own = self._hits(structure, outlines, s, t)
-        outlines, visible, s, t = outlines.take(found), visible[found], s[found], t[found]
-        cone = outlines.cone
-        left = 1.0 - np.bincount(cone, visible, minlength=n)
-        empty = np.flatnonzero((left > LEFT) & ~sampled)
-        self._count_cones(wave, np.flatnonzero(~sampled), np.bincount(cone, minlength=n) > 0, n_it, n_ts)
-        rows = [_narrowed(wave, cone, s, t, visible, outlines.item), _narrowed(wave, empty, 0.0, 0.0, left[empty])]
-        hits = [own, _misses(len(empty))]
-        if sampled.any():
-            which = np.repeat(np.flatnonzero(sampled), self.rays_each)
-            s, t = np.tile(points(cones.disc, self.rays_each), np.count_nonzero(sampled))
-            rays = _rays(_narrowed(wave, which, s, t, np.full(len(which), 1.0 / self.rays_each)))
-            rows.append(rays)
-            hits.append(self._closest_of(rays))
-        joined = {name: np.concatenate([h[name] for h in hits]) for name in own}
-        return ConeWave.joined(rows), joined
+            return wave, self._closest(wave)
+        worth = self.worth(wave.weight)
+        rays = np.where((wave.kind != PRIMARY) & (worth <= SMALL), 1.0, 0.0)
+        whole, parts = np.flatnonzero(rays == 0.0), []
+        for some in pace.slices(len(whole)):
+            which = whole[some]
+            part, hits, sampled = self._seen(structure, wave.take(which), pace)
+            parts.append((part, hits))
+            rays[which] = sampled
+        some = np.flatnonzero(rays)
+        if len(some) or not parts:
+            rays = self._spread(wave, some, worth[some] * rays[some])
+            hits = self._closest(rays)
+            parts.append((rays, {name: getattr(hits, name) for name in _misses(0)}))
+        fields = {name: np.concatenate([h[name] for _, h in parts]) for name in _misses(0)}
+        return ConeWave.joined([w for w, _ in parts]), Hits(**fields)
 
-    def visible(self, outlines):
-        """Shares of cones in which pieces are seen, and where: three arrays, one entry a piece."""
+    def _seen(self, structure, wave, pace):
+        """What the cones of a wave see: the rays to it, the fields of their Hits, and :meth:`within`'s `sampled`."""
+        self.check()
+        n = len(wave)
+        outlines, sampled, n_it, n_ts = structure.within(wave.cones)
+        pace.met(n, n_it.sum())
+        share, s, t = self.visible(outlines, wave)
+        seen = np.flatnonzero(share > 0.0)
+        outlines, share, s, t = outlines.take(seen), share[seen], s[seen], t[seen]
+        rank = _ranks(outlines.cone)
+        found, hits = self._hits(structure, outlines, s, t)
+        outlines, share, s, t = outlines.take(found), share[found], s[found], t[found]
+        cone = outlines.cone
+        left = 1.0 - np.bincount(cone, share, minlength=n)
+        whole = sampled == 0.0
+        empty = np.flatnonzero((left > LEFT) & whole)
+        self._count_cones(wave, np.flatnonzero(whole), np.bincount(cone, minlength=n) > 0, n_it, n_ts)
+        rows = [_narrowed(wave, cone, s, t, share, rank[found], outlines.item)]
+        if len(empty):
+            rows.append(_narrowed(wave, empty, 0.0, 0.0, left[empty], 0))
+            hits = {name: np.concatenate([a, b]) for (name, a), b in zip(hits.items(), _misses(len(empty)).values())}
+        return ConeWave.joined(rows), hits, sampled
+
+    def _spread(self, wave, which, worth):
+        """Rays, as many as they are worth, in place of some of a wave's cones."""
+        number = np.maximum(np.ceil(worth), 1.0).astype(np.int64)
+        rank = np.arange(number.sum()) - np.repeat(np.cumsum(number) - number, number)
+        which, number = np.repeat(which, number), np.repeat(number, number)
+        key = wave.key[which]
+        s, t = scattered(wave.cones.disc, rank, number, sampling.number(key, 0), sampling.number(key, 1))
+        return _rays(_narrowed(wave, which, s, t, 1.0 / number, rank))
+
+    def visible(self, outlines, wave):
+        """Shares of a wave's cones in which pieces are seen, and where: three arrays, one entry a piece."""
         raise NotImplementedError
 
     @staticmethod
@@ -147,7 +200,8 @@ class FootprintTracer(Whitted):
         found = usable[pair]
         names = ("object", "primitive", "part", "normal", "point", "error")
         hits = dict(zip(names, structure.primitives.surface(rays, pair, item[found], t, u, v, detail)))
-        return found, {"t": rays.callers_t(t, pair), "u": u, "v": v} | hits
+        fields = {"t": rays.callers_t(t, pair), "u": u, "v": v} | hits
+        return found, {name: fields[name] for name in _misses(0)}
 
     def _count_cones(self, wave, which, hit, n_it, n_ts):
         """Add cones to the tally."""
@@ -157,11 +211,6 @@ class FootprintTracer(Whitted):
             if self.count:
                 counts = dict.fromkeys(COUNTED, np.zeros(len(some), np.int64)) | {"n_it": n_it[some], "n_ts": n_ts[some]}
             self._count(kind, wave.pixel[some], np.count_nonzero(hit[some]), counts)
-
-    def _closest_of(self, wave):
-        """The fields of the rays' Hits."""
-        hits = self._closest(wave)
-        return {name: getattr(hits, name) for name in _misses(0)}
 
     def _first(self, wave, hits, met, surface):
         """The passes that show what pixels see most of."""
@@ -181,13 +230,19 @@ def _rays(wave):
     return ConeWave(cones, wave.weight, wave.pixel, wave.depth, wave.kind, wave.key)
 
 
-def _narrowed(wave, which, s, t, share, item=None):
+def _ranks(cone):
+    """Which of its cone's pieces each is: 0, 1, ...; `cone` is ascending."""
+    first = np.flatnonzero(np.diff(cone, prepend=-1))
+    return np.arange(len(cone)) - np.repeat(first, np.diff(first, append=len(cone)))
+
+
+def _narrowed(wave, which, s, t, share, rank, item=None):
     """Rays through (s, t) of some of a wave's cones, with as much of the cones' area about them as their share."""
     cones = wave.cones.take(which)
     cones.o, cones.d = wave.cones.rays(which, s, t)
     width = np.sqrt(share)
     cones.e, cones.f = cones.e * width, cones.f * width
-    key = None if wave.key is None else wave.key[which]
+    key = sampling.mix(wave.key[which] + np.asarray(rank).astype(np.uint64))
     return ConeWave(
         cones, wave.weight[:, which] * share, wave.pixel[which], wave.depth[which], wave.kind[which], key,
         item,

@@ -15,10 +15,16 @@ from . import clipping
 
 #: Points of the aperture at which it is judged what hides what.
 POINTS = 64
+#: Of the lattice R2: the two-dimensional golden ratio (Roberts 2018).
+STEP = 1.32471795724474602596
 #: Chords by which a conic's share of the aperture is measured.
 CHORDS = 16
 #: Shares below this are none.
 LEAST = 1e-12
+#: Pairs of cones and pieces taken up together, and pieces judged at points together: columns that stay in the cache.
+BLOCK, ROWS = 8192, 512
+#: Triangles are measured from their corners where these are not further from the axis: in radii of the aperture.
+FAR = 1e3
 
 
 def points(disc, n=POINTS):
@@ -27,8 +33,22 @@ def points(disc, n=POINTS):
     if disc:
         r, angle = np.sqrt(k / n), math.pi * (3.0 - math.sqrt(5.0)) * k
         return np.stack([r * np.cos(angle), r * np.sin(angle)])
-    # R2, the two-dimensional golden ratio (Roberts 2018).
-    return np.stack([2.0 * (k / 1.32471795724474602596 % 1.0) - 1.0, 2.0 * (k / 1.32471795724474602596**2 % 1.0) - 1.0])
+    return np.stack([2.0 * (k / STEP % 1.0) - 1.0, 2.0 * (k / STEP**2 % 1.0) - 1.0])
+
+
+def scattered(disc, k, n, u, v):
+    """The k-th of n points each, spread over an aperture and moved all together at random; shape (2, m).
+
+    Parameters
+    ----------
+    k, n : ndarray, shape (m,)
+    u, v : ndarray, shape (m,)
+        Uniform in [0, 1), alike for the n points of one aperture: each of them is then uniform in its part of it.
+    """
+    if disc:
+        r, angle = np.sqrt((k + u) / n), math.pi * ((3.0 - math.sqrt(5.0)) * k + 2.0 * v)
+        return np.stack([r * np.cos(angle), r * np.sin(angle)])
+    return np.stack([2.0 * ((k / STEP + u) % 1.0) - 1.0, 2.0 * ((k / STEP**2 + v) % 1.0) - 1.0])
 
 
 class Pieces:
@@ -96,7 +116,9 @@ class Pieces:
         Outlines
             Of the pieces that cover anything, by ascending cone.
         """
-        own = (self.place[:, item] == cones.leaving[:, cone]).all(axis=0)
+        own = (self.place[0].take(item) == cones.leaving[0].take(cone)) & (
+            self.place[1].take(item) == cones.leaving[1].take(cone)
+        )
         far_side = own & cones.inside[cone] & (self.number[self.first[item]] < 0)
         some = np.flatnonzero(~own | far_side)
         cone, item, far_side = cone[some], item[some], far_side[some]
@@ -105,13 +127,15 @@ class Pieces:
         cone, item, far_side = np.repeat(cone, count), np.repeat(item, count), np.repeat(far_side, count)
         number = self.number[piece]
         flat, round_ = np.flatnonzero(number >= 0), np.flatnonzero(number < 0)
-        out = Outlines(cones, cone, item, flat, round_)
-        if len(flat):
-            out.measure_triangles(self.corners[:, :, number[flat]])
-        if len(round_):
-            which = ~number[round_]
-            out.measure_spheres(*(a[..., which] for a in (self.matrix, self.inverse, self.origin)), far_side[round_])
-        return out
+        flats = _joined([
+            _flats(cones, cone[some], [c[:, number[some]] for c in self.corners], some)
+            for some in (flat[i : i + BLOCK] for i in range(0, max(len(flat), 1), BLOCK))
+        ])
+        which = ~number[round_]
+        rounds = _rounds(
+            cones, cone[round_], *(a[..., which] for a in (self.matrix, self.inverse, self.origin)), far_side[round_], round_
+        )
+        return Outlines.of(cones, cone, item, flats, rounds)
 
 
 def _triangles(kind):
@@ -136,106 +160,58 @@ class Outlines:
         A point of the aperture that it covers: the middle of its part.
     flat, round_ : ndarray
         Which are triangles, and which spheres.
-    lines : ndarray, shape (triangles, 6, 3)
+    lines : ndarray, shape (k, 3, triangles)
         The triangles' half planes, inside positive; those of zeros count for nothing.
     plane : ndarray, shape (4, triangles)
         Of x, y, w, and their sum.
     conic, front, square : ndarray, shapes (3, 3, spheres), (3, spheres), (3, 3, spheres)
         Quadratic form that is positive inside; the ray's part towards the centre; its length, squared.
+    far_side, limits : ndarray, shapes (spheres,), (2, spheres)
+        Whether it is met from inside; least and greatest w.
     """
 
-    def __init__(self, cones, cone, item, flat, round_):
-        self.cones, self.cone, self.item, self.flat, self.round_ = cones, cone, item, flat, round_
-        self.share, self.s, self.t = (np.zeros(len(cone)) for _ in range(3))
+    FLAT, ROUND = ("lines", "plane"), ("conic", "square", "front", "far_side", "limits")
+
+    @classmethod
+    def of(cls, cones, cone, item, flats, rounds):
+        """Outlines of measured pieces: dicts of columns, with `row`: which pairs of `cone` and `item` these are."""
+        out, order = cls(), np.argsort(np.concatenate([flats["row"], rounds["row"]]), kind="stable")
+        for name in ("share", "s", "t"):
+            setattr(out, name, np.concatenate([flats[name], rounds[name]])[order])
+        row, place = np.concatenate([flats["row"], rounds["row"]])[order], np.empty(len(order), np.int64)
+        place[order] = np.arange(len(order))
+        out.cones, out.cone, out.item = cones, cone[row], item[row]
+        out.flat, out.round_ = place[: len(flats["row"])], place[len(flats["row"]) :]
+        for columns, names in ((flats, cls.FLAT), (rounds, cls.ROUND)):
+            for name in names:
+                setattr(out, name, columns[name])
+        return out
 
     def __len__(self):
         return len(self.cone)
 
     def take(self, index):
         """Some of the pieces; `index` is ascending."""
-        out = Outlines.__new__(Outlines)
+        out = Outlines()
         out.cones = self.cones
         for name in ("cone", "item", "share", "s", "t"):
             setattr(out, name, getattr(self, name)[index])
         place = np.full(len(self), -1)
         place[index] = np.arange(len(index))
-        flat, round_ = np.flatnonzero(place[self.flat] >= 0), np.flatnonzero(place[self.round_] >= 0)
-        out.flat, out.round_ = place[self.flat[flat]], place[self.round_[round_]]
-        if len(self.flat):
-            out.lines, out.plane = self.lines[flat], self.plane[:, flat]
-        if len(self.round_):
-            out.conic, out.square = self.conic[:, :, round_], self.square[:, :, round_]
-            out.front, out.far_side, out.limits = self.front[:, round_], self.far_side[round_], self.limits[:, round_]
+        for name, names in (("flat", self.FLAT), ("round_", self.ROUND)):
+            new = place[getattr(self, name)]
+            some = np.flatnonzero(new >= 0)
+            setattr(out, name, new[some])
+            for column in names:
+                setattr(out, column, getattr(self, column)[..., some])
         return out
 
-    def measure_triangles(self, corners):
-        """Find lines, shares and middles of the triangles, whose corners are given."""
-        cones, cone = self.cones, self.cone[self.flat]
-        parallel = cones.parallel[cone]
-        x, y, w = np.stack([cones.local(c, cone) for c in corners], axis=1)
-        q = np.where(parallel, 1.0, w)
-        lines = np.zeros((len(cone), 6, 3))
-        for k, (i, j) in enumerate(((1, 2), (2, 0), (0, 1))):
-            lines[:, k, 0] = y[i] * q[j] - q[i] * y[j]
-            lines[:, k, 1] = q[i] * x[j] - x[i] * q[j]
-            lines[:, k, 2] = x[i] * y[j] - y[i] * x[j]
-        turn = x[0] * lines[:, 0, 0] + y[0] * lines[:, 0, 1] + q[0] * lines[:, 0, 2]
-        ax, ay, aw, bx, by, bw = (v[k] - v[0] for k in (1, 2) for v in (x, y, w))
-        nx, ny, nw = ay * bw - aw * by, aw * bx - ax * bw, ax * by - ay * bx
-        total = nx * x[0] + ny * y[0] + nw * w[0]
-        self.plane = np.stack([nx, ny, nw, total])
-        # w is (total - p (nx s + ny t)) / (nw + (1 - p) (nx s + ny t)), p = 1 in parallel cones.
-        p = parallel.astype(float)
-        for k, limit, sign in ((3, cones.t_min[cone], 1.0), (4, cones.t_max[cone], -1.0)):
-            some = np.isfinite(limit) & (parallel | (limit > 0.0))
-            limit = np.where(some, limit, 0.0)
-            rate = -sign * (p + (1.0 - p) * limit)
-            line = np.stack([rate * nx, rate * ny, sign * (total - limit * nw)], axis=-1)
-            lines[:, k] = np.where(some[:, None], line, 0.0)
-        there = turn != 0.0
-        bound = np.flatnonzero(cones.away[:, cone].any(axis=0))
-        if len(bound):
-            # Heights above the plane left are interpolated between corners as everything else is.
-            heights = np.stack([cones.height(cone[bound], c[:, bound]) for c in corners])
-            there[bound] &= (heights > 0.0).any(axis=0)
-            cut = (heights < 0.0).any(axis=0)
-            some = bound[cut]
-            lines[some, 5] = sum(h[:, None] * lines[some, k] for k, h in enumerate(heights[:, cut]))
-        lines *= np.sign(turn)[:, None, None]
-        self.lines = lines
-        self.share[self.flat], self.s[self.flat], self.t[self.flat] = _covered(lines, there, cones.disc)
-
-    def measure_spheres(self, matrix, inverse, origin, far_side):
-        """Find conics, shares and middles of the spheres, whose maps to unit space are given."""
-        cones, cone = self.cones, self.cone[self.round_]
-        o, d, e, f = (
-            np.stack([dot(row, v) for row in inverse])
-            for v in (cones.o[:, cone] - origin, cones.d[:, cone], cones.e[:, cone], cones.f[:, cone])
-        )
-        parallel = cones.parallel[cone]
-        # Directions (and, in parallel cones, origins) are sums of three columns by (s, t, 1).
-        zero = np.zeros_like(d)
-        axes = [np.where(parallel, zero, e), np.where(parallel, zero, f), d]
-        bases = [np.where(parallel, e, zero), np.where(parallel, f, zero), o]
-        # |v|^2 - |o x v|^2 is positive where the ray meets the sphere; o x v is linear in (s, t) either way.
-        moments = [np.cross(o, axes[k], axis=0) + np.where(parallel, np.cross(bases[k], d, axis=0), 0.0) for k in (0, 1)]
-        moments.append(np.cross(o, d, axis=0))
-        self.square = np.array([[dot(a, b) for a in axes] for b in axes])
-        self.conic = self.square - np.array([[dot(a, b) for a in moments] for b in moments])
-        self.front = np.stack([dot(axes[k], o) + np.where(parallel, dot(bases[k], d), 0.0) for k in (0, 1)] + [dot(d, o)])
-        distance = np.sqrt(dot(o, o))
-        self.far_side = far_side | (~parallel & (distance < 1.0))
-        self.limits = np.stack([cones.t_min[cone], cones.t_max[cone]])
-        whole = self.far_side & ~parallel
-        share, s, t = _chords(self.conic, np.where(parallel, 0.0, self.front), ~parallel, cones.disc)
-        share, s, t = np.where(whole, 1.0, share), np.where(whole, 0.0, s), np.where(whole, 0.0, t)
-        w = self._sphere_distance(s[:, None], t[:, None])[:, 0]
-        # The furthest point that way of a sphere behind the plane left is behind it, too.
-        away = cones.away[:, cone]
-        top = np.sqrt(sum(dot(matrix[:, c], away) ** 2 for c in range(3)))
-        behind = (dot(away, origin - cones.start[:, cone]) + top <= 0.0) & away.any(axis=0) & ~far_side
-        self.share[self.round_] = np.where(np.isfinite(w) & ~behind, share, 0.0)
-        self.s[self.round_], self.t[self.round_] = s, t
+    def nearness(self):
+        """What is linear in (s, t) and greater the nearer a triangle is: 1 / w, or -w in parallel cones; (3, triangles)."""
+        nx, ny, nw, total = self.plane
+        parallel = self.cones.parallel[self.cone[self.flat]]
+        with np.errstate(divide="ignore", invalid="ignore"):
+            return np.where(parallel, [nx / nw, ny / nw, -total / nw], [nx / total, ny / total, nw / total])
 
     def distances(self, s, t):
         """w at points of the aperture, shape (m, k); inf where a piece does not cover the point.
@@ -244,38 +220,197 @@ class Outlines:
         ----------
         s, t : ndarray, shape (k,) or (m, k)
         """
-        s, t = (np.broadcast_to(a, (len(self), a.shape[-1])) for a in (s, t))
-        out = np.full(s.shape, np.inf)
-        if len(self.flat):
-            out[self.flat] = self._triangle_distance(s[self.flat], t[self.flat])
+        out = np.full((len(self), s.shape[-1]), np.inf)
+        for i in range(0, len(self.flat), ROWS):
+            some = slice(i, i + ROWS)
+            rows = self.flat[some]
+            inside = self._inside(some, *_rows(s, t, rows))
+            w = self._plane_distance(some, *_rows(s, t, rows))
+            out[rows] = np.where(inside & np.isfinite(w), w, np.inf)
         if len(self.round_):
-            out[self.round_] = self._sphere_distance(s[self.round_], t[self.round_])
+            out[self.round_] = self._sphere_distance(*_rows(s, t, self.round_))
         return out
 
-    def _triangle_distance(self, s, t):
-        """w at points of the aperture, shape (triangles, k)."""
-        inside = np.ones(s.shape, bool)
-        for k in np.flatnonzero(self.lines.any(axis=(0, 2))):
-            a, b, c = self.lines[:, k].T[..., None]
-            inside &= a * s + b * t + c >= 0.0
-        nx, ny, nw, total = self.plane[..., None]
-        across = nx * s + ny * t
-        parallel = self.cones.parallel[self.cone[self.flat]][:, None]
+    def covers(self, s, t):
+        """Which points of the aperture pieces cover, shape (m, k); parameters as of :meth:`distances`."""
+        out = np.zeros((len(self), s.shape[-1]), bool)
+        for i in range(0, len(self.flat), ROWS):
+            some = slice(i, i + ROWS)
+            out[self.flat[some]] = self._inside(some, *_rows(s, t, self.flat[some]))
+        if len(self.round_):
+            out[self.round_] = self._sphere_distance(*_rows(s, t, self.round_)) < np.inf
+        return out
+
+    def _inside(self, some, s, t):
+        """Which points of the aperture some triangles cover."""
+        inside = np.ones((len(self.flat[some]), s.shape[-1]), bool)
+        for line in self.lines[:, :, some]:
+            if line.any():
+                a, b, c = line[..., None]
+                side = a * s
+                side += b * t
+                side += c
+                inside &= side >= 0.0
+        return inside
+
+    def _plane_distance(self, some, s, t):
+        """w at points of the aperture of some triangles' planes."""
+        nx, ny, nw, total = self.plane[:, some, None]
+        across = nx * s
+        across += ny * t
+        parallel = self.cones.parallel[self.cone[self.flat[some]]][:, None]
         with np.errstate(divide="ignore", invalid="ignore"):
-            w = np.where(parallel, total - across, total) / np.where(parallel, nw, nw + across)
-        return np.where(inside & np.isfinite(w), w, np.inf)
+            if not parallel.any():
+                across += nw
+                return np.divide(total, across, out=across)
+            return np.where(parallel, total - across, total) / np.where(parallel, nw, nw + across)
 
     def _sphere_distance(self, s, t):
         """w at points of the aperture, shape (spheres, k)."""
-        value = _form(self.conic[..., None], s, t)
-        b = self.front[0][:, None] * s + self.front[1][:, None] * t + self.front[2][:, None]
-        a = _form(self.square[..., None], s, t)
-        with np.errstate(invalid="ignore"):
-            root = np.sqrt(value)
-            near, far = (-b - root) / a, (-b + root) / a
-            least, most = self.limits[..., None]
-            w = np.where((near >= least) & ~self.far_side[:, None], near, far)
-            return np.where((w >= least) & (w <= most), w, np.inf)
+        return _sphere_distance(self.conic, self.square, self.front, self.far_side, self.limits, s, t)
+
+
+def _rows(s, t, rows):
+    """Points for some of the pieces: the same for all, or each its own."""
+    return (s, t) if s.ndim == 1 else (s[rows], t[rows])
+
+
+def _joined(parts):
+    """One dict of columns from several; lines that only some parts have are zeros in the others."""
+    if len(parts) == 1:
+        return parts[0]
+    k = max(len(part["lines"]) for part in parts)
+    for part in parts:
+        lines = part["lines"]
+        if len(lines) < k:
+            part["lines"] = np.concatenate([lines, np.zeros((k - len(lines), *lines.shape[1:]))])
+    return {name: np.concatenate([part[name] for part in parts], axis=-1) for name in parts[0]}
+
+
+def _flats(cones, cone, corners, row):
+    """Columns of the triangles that cover anything, whose corners are given: three arrays of shape (3, m)."""
+    inverse, o = cones.inverse[:, :, cone], cones.o[:, cone]
+    at = []
+    for corner in corners:
+        p = corner - o
+        at.append([dot(axis, p) for axis in inverse])
+    parallel = cones.parallel[cone]
+    some_parallel = parallel.any()
+    q = [np.where(parallel, 1.0, w) if some_parallel else w for _, _, w in at]
+    (x0, y0, w0), (x1, y1, w1), (x2, y2, w2) = at
+    q0, q1, q2 = q
+    edges = [
+        [yi * qj - qi * yj, qi * xj - xi * qj, xi * yj - yi * xj]
+        for xi, yi, qi, xj, yj, qj in ((x1, y1, q1, x2, y2, q2), (x2, y2, q2, x0, y0, q0), (x0, y0, q0, x1, y1, q1))
+    ]
+    turn = x0 * edges[0][0] + y0 * edges[0][1] + q0 * edges[0][2]
+    least, most = cones.t_min[cone], cones.t_max[cone]
+    nearest, furthest = np.minimum(np.minimum(w0, w1), w2), np.maximum(np.maximum(w0, w1), w2)
+    there = (turn < 0.0) | (turn > 0.0)
+    there &= (furthest >= least) & (nearest <= most)
+    side = np.sign(turn)
+    cutting = []
+    for a, b, c in edges:
+        a *= side
+        b *= side
+        c *= side
+        reach = np.sqrt(a * a + b * b) if cones.disc else np.abs(a) + np.abs(b)
+        there &= c >= -reach
+        cutting.append((c < reach, reach))
+    kept = np.flatnonzero(there)
+    cone = cone.take(kept)
+    parallel, side, turn, least, most, nearest, furthest = (
+        a.take(kept) for a in (parallel, side, turn, least, most, nearest, furthest)
+    )
+    lines = [[a.take(kept) for a in line] for line in edges]
+    cutting = [(cuts.take(kept), reach.take(kept)) for cuts, reach in cutting]
+    at, q = [[a.take(kept) for a in point] for point in at], [a.take(kept) for a in q]
+    (x0, y0, w0), (x1, y1, w1), (x2, y2, w2) = at
+    ax, ay, aw, bx, by, bw = x1 - x0, y1 - y0, w1 - w0, x2 - x0, y2 - y0, w2 - w0
+    nx, ny, nw = ay * bw - aw * by, aw * bx - ax * bw, ax * by - ay * bx
+    total = nx * x0 + ny * y0 + nw * w0
+    # w is (total - p (nx s + ny t)) / (nw + (1 - p) (nx s + ny t)), p = 1 in parallel cones.
+    for limit, beyond, sign in ((least, nearest < least, 1.0), (most, furthest > most, -1.0)):
+        # Half planes where surfaces come too near, or too far; none where they do not.
+        some = np.flatnonzero(beyond & np.isfinite(limit) & (parallel | (limit > 0.0)))
+        if len(some):
+            line, bound = np.zeros((3, len(kept))), limit[some]
+            rate = -sign * np.where(parallel[some], 1.0, bound) * side[some]
+            line[:, some] = rate * nx[some], rate * ny[some], sign * side[some] * (total[some] - bound * nw[some])
+            lines.append(line)
+    present = np.ones(len(kept), bool)
+    bound = np.flatnonzero(cones.away.any(axis=0)[cone]) if len(kept) else kept
+    if len(bound):
+        # Heights above the plane left are interpolated between corners as everything else is.
+        which = kept.take(bound)
+        heights = cones.heights(cone[bound], [c[:, which] for c in corners])
+        present[bound] = np.maximum(np.maximum(*heights[:2]), heights[2]) > 0.0
+        cut = np.flatnonzero(np.minimum(np.minimum(*heights[:2]), heights[2]) < 0.0)
+        if len(cut):
+            line, some = np.zeros((3, len(kept))), bound[cut]
+            for h, edge in zip(heights, lines[:3]):
+                for k in range(3):
+                    line[k, some] += h[cut] * edge[k][some]
+            lines.append(line)
+    for a, b, c in lines[3:]:
+        reach = np.sqrt(a * a + b * b) if cones.disc else np.abs(a) + np.abs(b)
+        present &= c >= -reach
+        cutting.append((c < reach, reach))
+    lines = np.array(lines)
+    share, s, t = _covered(lines, cutting, at, q, turn, present, cones.disc)
+    some = np.flatnonzero(share > 0.0)
+    return {
+        "row": row[kept[some]], "share": share[some], "s": s[some], "t": t[some], "lines": lines[:, :, some],
+        "plane": np.stack([nx, ny, nw, total])[:, some],
+    }
+
+
+def _rounds(cones, cone, matrix, inverse, origin, far_side, row):
+    """Columns of the spheres that cover anything, whose maps to unit space are given."""
+    o, d, e, f = (
+        np.stack([dot(row, v) for row in inverse])
+        for v in (cones.o[:, cone] - origin, cones.d[:, cone], cones.e[:, cone], cones.f[:, cone])
+    )
+    parallel = cones.parallel[cone]
+    # Directions (and, in parallel cones, origins) are sums of three columns by (s, t, 1).
+    zero = np.zeros_like(d)
+    axes = [np.where(parallel, zero, e), np.where(parallel, zero, f), d]
+    bases = [np.where(parallel, e, zero), np.where(parallel, f, zero), o]
+    # |v|^2 - |o x v|^2 is positive where the ray meets the sphere; o x v is linear in (s, t) either way.
+    moments = [np.cross(o, axes[k], axis=0) + np.where(parallel, np.cross(bases[k], d, axis=0), 0.0) for k in (0, 1)]
+    moments.append(np.cross(o, d, axis=0))
+    square = np.array([[dot(a, b) for a in axes] for b in axes])
+    conic = square - np.array([[dot(a, b) for a in moments] for b in moments])
+    front = np.stack([dot(axes[k], o) + np.where(parallel, dot(bases[k], d), 0.0) for k in (0, 1)] + [dot(d, o)])
+    within = far_side | (~parallel & (dot(o, o) < 1.0))
+    limits = np.stack([cones.t_min[cone], cones.t_max[cone]])
+    whole = within & ~parallel
+    share, s, t = _chords(conic, np.where(parallel, 0.0, front), ~parallel, cones.disc)
+    share, s, t = np.where(whole, 1.0, share), np.where(whole, 0.0, s), np.where(whole, 0.0, t)
+    w = _sphere_distance(conic, square, front, within, limits, s[:, None], t[:, None])[:, 0]
+    # The furthest point that way of a sphere behind the plane left is behind it, too.
+    away = cones.away[:, cone]
+    top = np.sqrt(sum(dot(matrix[:, c], away) ** 2 for c in range(3)))
+    behind = (dot(away, origin - cones.start[:, cone]) + top <= 0.0) & away.any(axis=0) & ~far_side
+    some = np.flatnonzero(np.isfinite(w) & ~behind & (share > 0.0))
+    columns = {
+        "row": row, "share": share, "s": s, "t": t, "conic": conic, "square": square, "front": front, "far_side": within,
+        "limits": limits,
+    }
+    return {name: column[..., some] for name, column in columns.items()}
+
+
+def _sphere_distance(conic, square, front, far_side, limits, s, t):
+    """w at points of the aperture, shape (spheres, k); inf where a sphere does not cover the point."""
+    value = _form(conic[..., None], s, t)
+    b = front[0][:, None] * s + front[1][:, None] * t + front[2][:, None]
+    a = _form(square[..., None], s, t)
+    with np.errstate(invalid="ignore"):
+        root = np.sqrt(value)
+        near, far = (-b - root) / a, (-b + root) / a
+        least, most = limits[..., None]
+        w = np.where((near >= least) & ~far_side[:, None], near, far)
+        return np.where((w >= least) & (w <= most), w, np.inf)
 
 
 def _form(m, s, t):
@@ -283,51 +418,87 @@ def _form(m, s, t):
     return m[0, 0] * s * s + m[1, 1] * t * t + m[2, 2] + 2.0 * (m[0, 1] * s * t + m[0, 2] * s + m[1, 2] * t)
 
 
-def _covered(lines, there, disc):
-    """Shares and middles of the part of the aperture on the positive side of all lines, shape (m, k, 3)."""
-    m = len(lines)
-    whole = np.pi if disc else 4.0
-    share, s, t = np.where(there, 1.0, 0.0), np.zeros(m), np.zeros(m)
-    a, b, c = lines[..., 0], lines[..., 1], lines[..., 2]
-    reach = np.sqrt(a * a + b * b) if disc else np.abs(a) + np.abs(b)
-    share[(c < -reach).any(axis=1)] = 0.0
-    cuts = (c < reach) & (share > 0.0)[:, None]
-    n_cuts = cuts.sum(axis=1)
-    one = np.flatnonzero(n_cuts == 1) if disc else np.zeros(0, np.int64)
-    if len(one):
-        k = cuts[one].argmax(axis=1)
-        far = reach[one, k]
-        h = c[one, k] / far
-        half = np.sqrt((1.0 - h) * (1.0 + h))
-        # The segment of the disc on one side of a chord at the distance h from its middle, and where its middle lies.
-        area = np.arccos(-h) + h * half
-        share[one] = area / whole
-        with np.errstate(divide="ignore", invalid="ignore"):
-            middle = np.where(area > 0.0, (2.0 / 3.0) * half**3 / area, 0.0) / far
-        s[one], t[one] = middle * a[one, k], middle * b[one, k]
-    many = np.flatnonzero(n_cuts > (1 if disc else 0))
-    if len(many):
-        corners, count = within_lines(np.where(cuts[many][..., None], lines[many], 0.0))
+def _covered(lines, cutting, at, q, turn, there, disc):
+    """Shares and middles of the part of the aperture on the positive side of all lines, shape (k, 3, m).
+
+    The first three lines are a triangle's sides. Triangles whose corners are seen are measured from these, the others
+    are clipped by all their lines.
+
+    Parameters
+    ----------
+    cutting : list of (ndarray, ndarray)
+        For each line, whether it cuts the aperture, and the length of its normal.
+    at, q : list
+        Corners (x, y, w) and what x and y are to be divided by.
+    turn : ndarray
+        Twice the triangle's area times all three of `q`; negative for one that is seen from behind.
+    there : ndarray of bool
+        Without, the share is 0.
+    """
+    whole = math.pi if disc else 4.0
+    share, s, t = np.where(there, 1.0, 0.0), np.zeros(len(turn)), np.zeros(len(turn))
+    n_cuts = sum(cuts.astype(np.int8) for cuts, _ in cutting)
+    if disc:
+        for (a, b, c), (cuts, length) in zip(lines, cutting):
+            one = np.flatnonzero(cuts & there & (n_cuts == 1))
+            far = length[one]
+            h = c[one] / far
+            half = np.sqrt((1.0 - h) * (1.0 + h))
+            # The segment of the disc on one side of a chord at the distance h from its middle, and where its middle lies.
+            area = np.arccos(-h) + h * half
+            share[one] = area / whole
+            with np.errstate(divide="ignore", invalid="ignore"):
+                middle = np.where(area > 0.0, (2.0 / 3.0) * half**3 / area, 0.0) / far
+            s[one], t[one] = middle * a[one], middle * b[one]
+    many = np.flatnonzero(there & (n_cuts > (1 if disc else 0)))
+    near = np.minimum(np.minimum(*q[:2]), q[2])[many] > 0.0
+    for cuts, _ in cutting[3:]:
+        near &= ~cuts[many]
+    direct = many[near]
+    x, y = (np.stack([p[axis][direct] / r[direct] for p, r in zip(at, q)]) for axis in (0, 1))
+    size = (x * x + y * y if disc else np.maximum(np.abs(x), np.abs(y))).max(axis=0, initial=0.0)
+    small = np.flatnonzero(size <= 1.0)
+    some = direct[small]
+    share[some] = 0.5 * np.abs(turn[some]) / (q[0][some] * q[1][some] * q[2][some]) / whole
+    s[some], t[some] = x[:, small].sum(axis=0) / 3.0, y[:, small].sum(axis=0) / 3.0
+    clipped = np.ones(len(many), bool)
+    clipped[np.flatnonzero(near)[small]] = False
+    if disc:
+        large = np.flatnonzero((size > 1.0) & (size < FAR * FAR))
+        clipped[np.flatnonzero(near)[large]] = False
+        some = direct[large]
+        back = turn[some] < 0.0
+        i, j = np.where(back, 2, 1), np.where(back, 1, 2)
+        corners = np.stack([
+            np.stack([a[0, large], a[i, large], a[j, large]], axis=1) for a in (x, y)
+        ], axis=-1)
+        _put(share, s, t, some, *clipping.moments_in_disc(corners), whole)
+    rest = many[clipped]
+    if len(rest):
+        own = np.stack([np.where(cuts[rest], line[:, rest], 0.0) for line, (cuts, _) in zip(lines, cutting)])
+        corners, count = within_lines(own)
         area, first = (clipping.moments_in_disc if disc else clipping.moments)(corners)
-        area = np.where(count >= 3, area, 0.0)
-        share[many] = np.clip(area / whole, 0.0, 1.0)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            middle = np.where(area[:, None] > LEAST * whole, first / area[:, None], 0.0)
-        s[many], t[many] = middle.T
+        _put(share, s, t, rest, np.where(count >= 3, area, 0.0), first, whole)
     return np.where(share < LEAST, 0.0, share), s, t
 
 
+def _put(share, s, t, rows, area, first, whole):
+    """Set shares and middles from areas and first moments."""
+    share[rows] = np.clip(area / whole, 0.0, 1.0)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        s[rows], t[rows] = np.where(area[:, None] > LEAST * whole, first / area[:, None], 0.0).T
+
+
 def within_lines(lines):
-    """Corners of the parts of the square aperture on the positive side of lines, shape (m, k, 3), and their numbers."""
-    m = len(lines)
+    """Corners of the parts of the square aperture on the positive side of lines, shape (k, 3, m), and their numbers."""
+    m = lines.shape[2]
     corners = np.broadcast_to([(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)], (m, 4, 2))
     count = np.full(m, 4)
-    for k in range(lines.shape[1]):
-        line = lines[:, k]
-        cuts = line[:, 2] < np.abs(line[:, 0]) + np.abs(line[:, 1])
-        rows = np.flatnonzero(cuts & (count > 0))
+    for line in lines:
+        a, b, c = line
+        rows = np.flatnonzero((c < np.abs(a) + np.abs(b)) & (count > 0))
         if len(rows):
-            clipped = clipping.clip(corners[rows], count[rows], line[rows])
+            clipped = clipping.clip(corners[rows], count[rows], line[:, rows].T)
             choice, row = np.zeros(m, np.int64), np.arange(m)
             choice[rows], row[rows] = 1, np.arange(len(rows))
             corners, count = clipping.joined([(corners, count), clipped], choice, row)

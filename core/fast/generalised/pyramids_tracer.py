@@ -24,13 +24,13 @@ class PyramidTracer(FootprintTracer):
     def _sent(self, *arguments):
         return Whitted._sent(self, *arguments)
 
-    def visible(self, outlines):
+    def visible(self, outlines, wave):
         """See :class:`FootprintTracer`."""
-        corners, count = within_lines(outlines.lines) if len(outlines) else within_lines(np.zeros((0, 1, 3)))
+        corners, count = within_lines(outlines.lines)
         first = np.flatnonzero(np.diff(outlines.cone, prepend=-1))
         size = np.diff(first, append=len(outlines))
         begin, number = np.repeat(first, size), np.repeat(size, size)
-        planes = self._nearness(outlines)
+        planes = outlines.nearness().T
         owner = np.arange(len(outlines))
         least, most = corners.min(axis=1), corners.max(axis=1)
         for j in range(int(size.max(initial=1)) if (size > 1).any() else 0):
@@ -48,7 +48,7 @@ class PyramidTracer(FootprintTracer):
             some, rest = np.flatnonzero(hides), np.flatnonzero(~hides & (count >= 3))
             if not len(some):
                 continue
-            lines = np.concatenate([outlines.lines[other[some]], line[some][:, None]], axis=1)
+            lines = np.concatenate([outlines.lines[:, :, other[some]].transpose(2, 0, 1), line[some][:, None]], axis=1)
             parts = clipping.subtract(corners[some], count[some], owner[some], lines)
             corners, count, owner = clipping.padded([(corners[rest], count[rest], owner[rest]), parts])
         area, moment = clipping.moments(corners)
@@ -57,13 +57,3 @@ class PyramidTracer(FootprintTracer):
         with np.errstate(divide="ignore", invalid="ignore"):
             s, t = (np.where(total > 0.0, np.bincount(owner, m, minlength=n) / total, 0.0) for m in moment.T)
         return np.clip(total / 4.0, 0.0, 1.0), s, t
-
-    @staticmethod
-    def _nearness(outlines):
-        """What is linear in (s, t) and greater the nearer a piece is: 1 / w, or -w in parallel pyramids; shape (m, 3)."""
-        nx, ny, nw, total = outlines.plane if len(outlines) else np.zeros((4, 0))
-        parallel = outlines.cones.parallel[outlines.cone]
-        with np.errstate(divide="ignore", invalid="ignore"):
-            return np.stack(
-                np.where(parallel, [nx / nw, ny / nw, -total / nw], [nx / total, ny / total, nw / total]), axis=-1
-            )

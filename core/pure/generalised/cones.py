@@ -1,5 +1,6 @@
 """Cones instead of rays (Amanatides 1984)."""
 
+from ...scene.footprints import MANY
 from .footprints import FootprintTree
 
 
@@ -8,3 +9,4 @@ class ConeTree(FootprintTree):
 
     SUPPORTED = ("triangle", "polygon", "sphere")
     NAME = "cones"
+    MOST = MANY

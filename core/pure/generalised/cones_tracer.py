@@ -2,17 +2,23 @@
 
 One cone a pixel antialiases; a cone to a light tells which share of it is hidden; reflected and refracted cones are as
 wide as surfaces bend and scatter them.
+
+A wide cone sees hundreds of small pieces, and each would be shaded, need shadows and send on cones. Of those that weigh
+little in the pixel some are therefore chosen, at random, to stand for the others: the expected value is the same. What
+weighs less than a ray (see :mod:`.footprint_tracer`) has shadow rays instead of shadow cones.
 """
 
 import math
 from dataclasses import replace
 
+from ...scene.footprints import SMALL
+from ..tracing import sampling
 from ..tracing.vectors import add, cross, dot, frame, minus, mul, pushed, times, unit
 from ..tracing.whitted import REFLECTED, SHADOW, TRANSPARENT
 from .cone import Cone
 from .footprint_tracer import ConePath, FootprintTracer, hit_of
 from .footprints import FootprintTree
-from .outlines import points
+from .outlines import points, scattered
 
 #: Cones that widen less than by their width along so many times the scene's size are taken as parallel.
 PARALLEL = 1e4
@@ -49,7 +55,7 @@ class ConeTracer(FootprintTracer):
             self.soft = False
             self.lights = [(light, 1.0) for light in scene.lights if any(light.colour)]
 
-    def visible(self, outlines):
+    def visible(self, outlines, path):
         """See :class:`FootprintTracer`.
 
         What hides what is judged at points of the aperture, as in the A-buffer (Carpenter 1984).
@@ -83,32 +89,52 @@ class ConeTracer(FootprintTracer):
         most = max(share for _, share, _, _ in seen)
         kept = [piece for piece in seen if piece[1] >= SCRAP * most]
         ratio = sum(piece[1] for piece in seen) / max(sum(piece[1] for piece in kept), 1e-300)
-        return [(outline, share * ratio, s, t) for outline, share, s, t in kept]
+        return self._fewer([(outline, share * ratio, s, t) for outline, share, s, t in kept], path)
+
+    def _fewer(self, pieces, path):
+        """Of the pieces that weigh little only some, which then weigh more: systematic sampling."""
+        weight, least = max(path.weight), SMALL / self.rays_each
+        total = sum(share for _, share, _, _ in pieces if share * weight < least)
+        if not total:
+            return pieces
+        number = math.ceil(total * weight / least)
+        last = max(k for k, (_, share, _, _) in enumerate(pieces) if share * weight < least)
+        u = before = sampling.number(path.key, 0)
+        upto, out = 0.0, []
+        for k, (outline, share, s, t) in enumerate(pieces):
+            if share * weight < least:
+                upto += share
+                after = number + u if k == last else upto * (number / total) + u
+                share, before = (math.floor(after) - math.floor(before)) * (total / number), after
+            out.append((outline, share, s, t))
+        return out
+
+    def _met(self, path):
+        parts = super()._met(path)
+        # Whose surface is shaded, while these parts are looked at.
+        self._path_to = {id(surface): own for own, _, surface in parts}
+        return parts
 
     def _transmitted(self, surface, to, reach, light):
         """Share of light that reaches a surface; by one cone to a light that has an extent."""
         if not (self.soft_cones and light.has_extent):
             return super()._transmitted(surface, to, reach, light)
+        path = self._path_to[id(surface)]
+        worth = self.worth(path.weight)
+        if worth <= 1.0:
+            return self._open_to_rays(surface, to, reach, light, path.key, worth)
         o = pushed(surface.point, surface.error, surface.normal, to)
         d, t_max = to, math.inf
         if math.isfinite(reach):
             d = add(to, minus(surface.point, o))
             t_max = max(1.0 - self.rounding / max(map(abs, d)), 0.0)
-        if light.kind == "area":
-            e, f = (tuple(map(float, axis)) for axis in light.axes)
-        else:
-            e, f = (times(light.radius, axis) for axis in frame(unit(to)))
-        disc = light.kind != "area" or light.shape == "ellipse"
+        e, f, disc = _aperture(light, to)
         leaves = surface.point, surface.normal, surface.place, not surface.outside
         cone = Cone(o, d, e, f, 0.0, t_max, False, *leaves, disc)
         structure = self.probe["shadow"].structure
         outlines, sampled, n_it, n_ts = structure.within(cone)
         if sampled:
-            total, n = (0.0, 0.0, 0.0), self.rays_each
-            for s, t in points(disc, n):
-                towards = add(to, add(times(s, e), times(t, f)))
-                total = add(total, super()._transmitted(surface, towards, reach, light))
-            return times(1.0 / n, total)
+            return self._open_to_rays(surface, to, reach, light, path.key, worth * sampled)
         veil, opaque = (1.0, 1.0, 1.0), outlines
         if self.coloured_shadows:
             opaque = []
@@ -121,6 +147,18 @@ class ConeTracer(FootprintTracer):
         hidden = united(opaque)
         self._count_cone(SHADOW, hidden > 0.0, n_it, n_ts)
         return times(1.0 - hidden, veil)
+
+    def _open_to_rays(self, surface, to, reach, light, key, worth):
+        """Share of a light that is not hidden, by as many rays as the surface is worth."""
+        n, total = max(math.ceil(worth), 1), (0.0, 0.0, 0.0)
+        dimension = sampling.LIGHTS + 2 * next(i for i, (l, _) in enumerate(self.lights) if l is light)
+        u, v = sampling.number(key, dimension), sampling.number(key, dimension + 1)
+        e, f, disc = _aperture(light, to)
+        for k in range(n):
+            s, t = scattered(disc, k, n, u, v)
+            towards = add(to, add(times(s, e), times(t, f)))
+            total = add(total, super()._transmitted(surface, towards, reach, light))
+        return times(1.0 / n, total)
 
     def _passing(self, structure, outline):
         """Share of light, a colour, that passes through a piece."""
@@ -199,6 +237,14 @@ class ConeTracer(FootprintTracer):
         u = path.hit.u + dot(cross(away, y), n) / size
         v = path.hit.v + dot(cross(x, away), n) / size
         return self.surfaces.smooth(surface.normal, replace(path.hit, u=u, v=v))
+
+
+def _aperture(light, to):
+    """What a light extends by to two sides, seen along `to`; and whether it is round."""
+    if light.kind == "area":
+        e, f = (tuple(map(float, axis)) for axis in light.axes)
+        return e, f, light.shape == "ellipse"
+    return *(times(light.radius, axis) for axis in frame(unit(to))), True
 
 
 def united(outlines):

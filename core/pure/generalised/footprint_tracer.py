@@ -2,11 +2,17 @@
 
 All else is Whitted's tracer: each visible piece is shaded, at its middle, as the hit of a ray that weighs as much as
 its share; what is left sees the surroundings.
+
+The parameter ``samples`` says how many rays a whole pixel is worth. A cone that reaches what cannot be tested as a whole
+becomes as many rays as its weight in the pixel is worth, at least one, spread over it at random. So does a cone that is
+worth a small part of a ray, and one that reaches a crowd of primitives, with more rays. The work in a pixel is bounded
+for that reason, however many surfaces rays are sent on by, and the expected value is the mean over the cone.
 """
 
 import math
 from dataclasses import dataclass, replace
 
+from ...scene.footprints import SMALL
 from ..ray import Ray
 from ..structure import Hit
 from ..tracing import sampling
@@ -15,7 +21,7 @@ from ..tracing.vectors import minus, times
 from ..tracing.whitted import KINDS, PRIMARY, Path, Whitted
 from .cone import Cone
 from .footprints import FootprintTree
-from .outlines import points
+from .outlines import scattered
 
 #: Background is seen where at least so much of a cone is left.
 LEFT = 1e-9
@@ -43,12 +49,13 @@ class ConePath(Path):
         """The axis of a cone."""
         return cls(cone.o, cone.d, cone.t_min, cone.t_max, weight, depth, kind, key, cone.leaving, cone)
 
-    def narrowed(self, s, t, share):
-        """The ray through (s, t), with as much of the cone's area about it as its share."""
+    def narrowed(self, s, t, share, rank):
+        """The ray through (s, t), with as much of the cone's area about it as its share; `rank` tells it from others."""
         o, d = self.cone.ray(s, t)
         width = math.sqrt(share)
         cone = replace(self.cone, o=o, d=d, e=times(width, self.cone.e), f=times(width, self.cone.f))
-        return ConePath.along(cone, times(share, self.weight), self.depth, self.kind, self.key)
+        key = sampling.mix((self.key + rank) & sampling.MASK)
+        return ConePath.along(cone, times(share, self.weight), self.depth, self.kind, key)
 
     def as_ray(self):
         """The same with the apex where it starts: of rays beside the axis some might meet the surface itself."""
@@ -70,10 +77,15 @@ class FootprintTracer(Whitted):
         self.rays_each = structures["primary"].parameters["samples"]
         self.notices = structures["primary"].notices
 
+    def worth(self, weight):
+        """How many rays a cone is worth that weighs so much, a colour, in its pixel."""
+        # Just enough less that rounding makes no further ray.
+        return (1.0 - 1e-9) * self.rays_each * max(weight)
+
     def pixel(self, x, y, sample):
         """See :class:`Whitted`."""
         camera, size = self.scene.camera, self.size
-        key = sampling.first_key(y * size[0] + x, sample, self.seed) if self.soft or self.roulette else None
+        key = sampling.first_key(y * size[0] + x, sample, self.seed)
         o, d = through(camera, size, x + 0.5, y + 0.5)
         # Half a pixel to the right and upwards; of a disc, as much as has the pixel's area.
         reach = 1.0 / math.sqrt(math.pi) if self.disc else 0.5
@@ -92,26 +104,35 @@ class FootprintTracer(Whitted):
         structure = probe.structure
         if not isinstance(structure, FootprintTree):
             return [self._traced(path.as_ray())]
+        worth = self.worth(path.weight)
+        if path.kind != PRIMARY and worth <= SMALL:
+            return self._spread(path, worth)
         outlines, sampled, n_it, n_ts = structure.within(path.cone)
         if sampled:
-            share = 1.0 / self.rays_each
-            places = points(path.cone.disc, self.rays_each)
-            return [self._traced(path.narrowed(s, t, share).as_ray()) for s, t in places]
+            return self._spread(path, worth * sampled)
         parts, left = [], 1.0
-        for outline, share, s, t in self.visible(outlines):
-            hit = hit_of(structure, outline, s, t) if share > 0.0 else None
+        seen = [piece for piece in self.visible(outlines, path) if piece[1] > 0.0]
+        for rank, (outline, share, s, t) in enumerate(seen):
+            hit = hit_of(structure, outline, s, t)
             if hit is not None:
-                own = path.narrowed(s, t, share)
+                own = path.narrowed(s, t, share, rank)
                 own.item, own.hit = outline.item, hit
                 parts.append((own, hit, self.surfaces.at(hit, own.d)))
                 left -= share
         self._count_cone(path.kind, bool(parts), n_it, n_ts)
         if left > LEFT:
-            parts.append((path.narrowed(0.0, 0.0, left), None, None))
+            parts.append((path.narrowed(0.0, 0.0, left, 0), None, None))
         return parts
 
-    def visible(self, outlines):
-        """Yield for each piece (itself, share of the cone in which it is seen, and where)."""
+    def _spread(self, path, worth):
+        """Rays, as many as it is worth, in place of a cone."""
+        n = max(math.ceil(worth), 1)
+        u, v = sampling.number(path.key, 0), sampling.number(path.key, 1)
+        places = [scattered(path.cone.disc, k, n, u, v) for k in range(n)]
+        return [self._traced(path.narrowed(s, t, 1.0 / n, k).as_ray()) for k, (s, t) in enumerate(places)]
+
+    def visible(self, outlines, path):
+        """Yield for each piece (itself, share of the path's cone in which it is seen, and where)."""
         raise NotImplementedError
 
     def _traced(self, path):

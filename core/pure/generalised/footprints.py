@@ -1,7 +1,9 @@
 """What cones and pyramids share: a tree of boxes that they walk as a whole, and rays beside them."""
 
+import math
+
 from ..hierarchies.bvh import BVH
-from ...scene.footprints import unsupported
+from ...scene.footprints import SMALL, unsupported
 from .outlines import Flat, Round, pieces_of
 
 
@@ -16,6 +18,8 @@ class FootprintTree(BVH):
 
     #: Kinds of primitives that are tested as a whole, and by what.
     SUPPORTED, NAME = (), ""
+    #: What reaches more primitives is not looked at as a whole.
+    MOST = math.inf
 
     def build(self, progress, samples, **parameters):
         super().build(progress, builder="sah", order="shuffled", seed=0, leaf_size=2, walk="depth-first")
@@ -40,8 +44,9 @@ class FootprintTree(BVH):
         -------
         outlines : list of Outline
             The pieces of primitives that cover anything of the cone's section.
-        sampled : bool
-            It reaches the box of a primitive that cannot be tested against it.
+        sampled : float
+            0, but for a cone that must be sampled by rays: 1 for one that reaches the box of a primitive that cannot be
+            tested against it; 1 / SMALL, so many rays in place of one, for one that reaches too many primitives.
         n_it, n_ts : int
             Primitives tested, nodes entered.
         """
@@ -53,10 +58,12 @@ class FootprintTree(BVH):
                 n_ts += 1
                 items += [i for i in node.items if cone.meets_box(self.primitives[i].lo, self.primitives[i].hi)]
                 stack += node.children
+            if len(items) > self.MOST:
+                return [], 1.0 / SMALL, 0, n_ts
         if any(not self.pieces[i] for i in items):
-            return [], True, 0, n_ts
+            return [], 1.0, 0, n_ts
         outlines = [outline for i in sorted(items) for outline in self._seen(cone, i)]
-        return [outline for outline in outlines if outline.share > 0.0], False, len(items), n_ts
+        return [outline for outline in outlines if outline.share > 0.0], 0.0, len(items), n_ts
 
     def _seen(self, cone, item):
         """The outlines of a primitive's pieces."""

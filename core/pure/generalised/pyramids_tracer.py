@@ -20,7 +20,7 @@ class PyramidTracer(FootprintTracer):
     def _met(self, path):
         return super()._met(path) if isinstance(path, ConePath) else Whitted._met(self, path)
 
-    def visible(self, outlines):
+    def visible(self, outlines, path):
         """See :class:`FootprintTracer`."""
         nearness = [_nearness(outline) for outline in outlines]
         whole = [within_lines(outline.lines) for outline in outlines]
