@@ -66,7 +66,7 @@ class Peer(Structure):
         reach = np.maximum(np.abs(lo - rays.o), np.abs(hi - rays.o)).max(axis=0)
         slack = FLOAT32_SLACK * np.maximum(np.maximum(np.abs(lo), np.abs(hi)).max(), np.abs(rays.o).max(axis=0))
         near, far = np.maximum(rays.t_min, -reach), np.minimum(rays.t_max, reach) + slack
-        endless = Rays(rays.o, rays.d, np.full(rays.n, -np.inf), np.full(rays.n, np.inf), rays.exponent)
+        endless = Rays(rays.o, rays.d, np.full(rays.n, -np.inf), np.full(rays.n, np.inf), rays.power)
         ray = np.flatnonzero(near <= far)
         for _ in range(SEARCHES):
             origins = (rays.o[:, ray] + near[ray] * rays.d[:, ray]).T.astype(np.float32)
