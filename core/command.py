@@ -85,7 +85,7 @@ def main(argv=None, read_scene=None, open_in_blender=None, read_frames=None):
     except ParameterError as error:
         return _fail(f"rayscope: {error}", WRONG_CALL)
     call.scene = lambda size=None: _scene(call, read_scene, open_in_blender, size)
-    call.read_frames, call.in_blender = read_frames, read_scene is not None
+    call.read_frames, call.in_blender, call.open_in_blender = read_frames, read_scene is not None, open_in_blender or _no_blender
     try:
         outcome = VERBS[call.verb].run(call)
         print(report.to_json(outcome.json) if call.json else outcome.text, flush=True)
@@ -107,6 +107,11 @@ def main(argv=None, read_scene=None, open_in_blender=None, read_frames=None):
         where = traceback.extract_tb(error.__traceback__)[-1]
         return _fail(f"rayscope {call.verb}: internal error, please report it: {type(error).__name__}: {error} "
                      f"({Path(where.filename).name}, line {where.lineno}).", FAILED)
+
+
+def _no_blender(path, size=None):
+    """What is called where nothing can read Blender's files."""
+    raise MissingPackageError(f"{path}: only Blender can read it.")
 
 
 def say(line):
@@ -396,15 +401,21 @@ def bench_options(sub):
     sub.add_argument("--growth", action="store_true", help="also how times grow from 1k to 1M triangles")
     sub.add_argument("--division", action="store_true", help="instead: what divides space, against brute force, its walks, lists and regions; "
                      "with --growth only how they grow, from 1k triangles on; --subdivisions 5: to 1M")
-    sub.add_argument("--automatic", action="store_true", help="instead: the automatic choice of techniques against each fixed one, on the procedural databases")
+    sub.add_argument("--automatic", action="store_true", help="instead: the automatic choice of techniques against each fixed one, on the "
+                     "procedural databases and the examples")
 
 
 def bench_verb(call):
     """Times against mathutils and Embree."""
     if call.automatic:
         from .lab import needs
-        rows = needs.benchmark(tuple(min(side, 256) for side in call.size), repeats=min(call.repeats, 3), say=say)
-        return Outcome(report.table(rows, list(rows[0])), report.record("bench", None, None, {"automatic": True, "size": call.size}, rows=rows))
+        size = tuple(min(side, 320) for side in call.size)
+        rows, missed = needs.benchmark(_examples(call, size), size, repeats=min(call.repeats, 3), say=say)
+        text = report.table(rows, list(rows[0]))
+        if missed:
+            text += f"\n\nOver {needs.BARS[0]:.0%} slower than the best, or over {needs.BARS[1]:.0%} slower than bvh: {', '.join(missed)}."
+        record = report.record("bench", None, None, {"automatic": True, "size": size}, rows=rows, missed=missed)
+        return Outcome(text, record, FAILED if missed else DONE)
     if call.division:
         from .lab import division
         size = tuple(min(side, 128) for side in call.size)
@@ -422,6 +433,17 @@ def bench_verb(call):
     record = report.record("bench", result.pop("scene"), call.seed,
                            {"subdivisions": call.subdivisions, "size": call.size, "repeats": call.repeats, "growth": call.growth}, **result)
     return Outcome("\n\n".join([bench.text(record), against_brute.text(balls)]), record, FAILED if result["failed"] else DONE)
+
+
+def _examples(call, size):
+    """The scenes of example_blends, one after the other; none, and a line that says so, where they cannot be read."""
+    from dataclasses import replace
+    for path in sorted((Path(__file__).parents[1] / "example_blends").glob("*.blend")):
+        try:
+            yield replace(call.open_in_blender(path, size), name=path.stem)
+        except MissingPackageError as error:
+            say(f"The examples are left out. {error}")
+            return
 
 
 # --- stability --------------------------------------------------------------------------------------------------------

@@ -7,48 +7,55 @@ import numpy as np
 
 from .hits import Hits
 
+#: Seconds that rays have taken before the first trial: before, one costs more than it can bring.
+START = 0.15
+#: The next trial comes when they have taken so many times as long.
+GROWTH = 4
+#: A structure is built when rays have taken so many times as long as that will take: whatever comes of it, little is lost.
+REPAID = 10.0
+#: Rays that each structure gets in the two heats of a trial, of the second if there are so many; it is for those that took no
+#: more than CLOSE times as long as the best in the first.
+HEATS, CLOSE = (256, 2048), 4.0
 #: Neighbouring rays that go to the same structure in a trial: as many as are traced well together.
 BLOCK = 64
-#: Rays of a trial for each structure, at least and at most; between these, all structures together get PART of a batch.
-LEAST, MOST, PART = 512, 2048, 0.25
-#: Rays asked beforehand: some techniques make their lists when the first rays come.
+#: Rays asked before the first trial: some techniques make their lists when the first rays come.
 FIRST = 32
-#: The next trial comes when there were so many times as many rays.
-GROWTH = 4
 
 
 class Contest:
     """Several structures of the numpy core over one scene, as one that answers one kind of ray.
 
     In a trial blocks of neighbouring rays go to each in turn, so that all have the same kind of rays, from the same places
-    and at the same moment; all other rays go to the one that has taken the least time. Trials come with the first rays and
-    then ever more seldom, so the slower structures get a small part of the picture, which is no part lost: their answers are
-    the same.
+    and at the same moment. As numpy's calls take the same time for few rays as for many, two heats tell what a batch takes
+    and what a ray takes. All other rays go to the structure that is the quickest with so many. Trials come when there were
+    many rays, and then ever more seldom, so the slower structures get a small part of the picture, which is no part lost:
+    their answers are the same.
 
     Parameters
     ----------
-    structures : list of Structure
-        The first answers what is too little for a trial.
-
-    Attributes
-    ----------
-    seconds : list of float
-        Of each in all trials; of the thread, for others may use the processor too.
-    seen : int
-        Rays so far.
+    structure : Structure
+        Answers until there is a trial.
+    others : list of (callable, float)
+        What builds another one, and the seconds that this is thought to take.
+    expected : int
+        Rays that will come, about: when more than half of them came there are no more trials.
     """
 
-    def __init__(self, structures):
-        self.structures, self.seconds = structures, [0.0] * len(structures)
-        self.seen = self._due = 0
-        self._lights = {}
-        self.follows = any(s.follows for s in structures)
+    def __init__(self, structure, others, expected):
+        self.structures, self.others, self.expected = [structure], list(others), expected
+        self.seen, self.seconds, self._due = 0, 0.0, START
+        self.batch, self.ray = [0.0], [0.0]
+        self._own = {}
+
+    @property
+    def follows(self):
+        """Whether one of them makes use of knowing which primitive a ray leaves."""
+        return any(s.follows for s in self.structures)
 
     @property
     def leader(self):
-        """The structure that has taken the least time; for rays to several lights, in all."""
-        seconds = [sum(s) for s in zip(self.seconds, *(light.seconds for light in self._lights.values()))]
-        return self.structures[seconds.index(min(seconds))]
+        """The structure that answers most rays."""
+        return self.structures[self._quickest(HEATS[-1])]
 
     @property
     def technique(self):
@@ -56,56 +63,128 @@ class Contest:
         return self.leader.technique
 
     def for_light(self, light):
-        """The contest for shadow rays to a light: some keep something for each, which is made when its first ray comes."""
-        if id(light) not in self._lights:
-            self._lights[id(light)] = Contest([s.for_light(light) for s in self.structures])
-        return self._lights[id(light)]
+        """The same contest, about shadow rays to a light: for these some have a structure of its own."""
+        return OneLight(self, light)
 
-    def closest(self, origins, directions, t_min=0.0, t_max=np.inf, count=False, progress=None, leaving=None):
+    def asked(self, number, light):
+        """The structure of this number, or what it has for a light."""
+        if light is None:
+            return self.structures[number]
+        key = number, id(light)
+        if key not in self._own:
+            self._own[key] = self.structures[number].for_light(light)
+        return self._own[key]
+
+    def closest(self, origins, directions, t_min=0.0, t_max=np.inf, count=False, progress=None, leaving=None, light=None):
         """As of a structure."""
         def ask(structure, which):
             return structure.closest(origins[which], directions[which], _part(t_min, which), _part(t_max, which), count, progress,
                                      _left(structure, leaving, which))
 
-        answers, order = self._put(len(origins), ask)
+        answers, order = self._put(len(origins), ask, light)
         if order is None:
             return answers[0]
         columns = {f.name: [getattr(a, f.name) for a in answers] for f in fields(Hits)}
         return Hits(**{name: None if some[0] is None else np.concatenate(some)[order] for name, some in columns.items()})
 
-    def occluded(self, origins, directions, t_min=0.0, t_max=np.inf, count=False, progress=None, leaving=None):
+    def occluded(self, *arguments, **more):
         """As of a structure."""
+        return self._blocked("occluded", *arguments, **more)
+
+    def blockers(self, *arguments, **more):
+        """As of a structure."""
+        return self._blocked("blockers", *arguments, **more)
+
+    def _blocked(self, question, origins, directions, t_min=0.0, t_max=np.inf, count=False, progress=None, leaving=None, light=None):
+        """What a question about anything in the way is answered."""
         def ask(structure, which):
-            answer = structure.occluded(origins[which], directions[which], _part(t_min, which), _part(t_max, which), count, progress,
-                                        _left(structure, leaving, which))
+            answer = getattr(structure, question)(origins[which], directions[which], _part(t_min, which), _part(t_max, which), count, progress,
+                                                  _left(structure, leaving, which))
             return answer if count else (answer, {})
 
-        answers, order = self._put(len(origins), ask)
+        answers, order = self._put(len(origins), ask, light)
         if order is not None:
             answers = [(np.concatenate([a for a, _ in answers])[order],
                         {name: np.concatenate([c[name] for _, c in answers])[order] for name in answers[0][1]})]
         return answers[0] if count else answers[0][0]
 
-    def _put(self, n, ask):
+    def _put(self, n, ask, light):
         """Answers of n rays, and the order that they are to be brought into; None where there is one answer."""
+        start = time.thread_time()                                          # not the clock: others may use the processor too
+        parts, answers, done = [], [], 0
+        if self.seconds >= self._due and 2 * self.seen < self.expected:
+            parts, answers, done = self._trial(n, ask, light)
+        answers.append(ask(self.asked(self._quickest(n), light), slice(done, n) if done else slice(None)))
         self.seen += n
+        self.seconds += time.thread_time() - start
+        if not done:
+            return answers, None
+        return answers, np.argsort(np.concatenate([*parts, np.arange(done, n)]))
+
+    def _trial(self, n, ask, light):
+        """Ask all some of n rays: the numbers of these, the answers, and how many they are."""
+        pays = [build for build, seconds in self.others if REPAID * seconds <= self.seconds]
+        self.others = [other for other in self.others if other[0] not in pays]
+        for build in pays:
+            self.structures.append(build())
+            self.batch.append(0.0)
+            self.ray.append(0.0)
         k = len(self.structures)
-        if self.seen < self._due or n < k * LEAST:
-            return [ask(self.leader, slice(None))], None
-        first, self._due = not self._due, GROWTH * self.seen
-        tried = int(min(max(PART * n, k * LEAST), k * MOST))
-        turn = np.arange(tried) // min(BLOCK, tried // k) % k
-        parts, answers = [np.flatnonzero(turn == i) for i in range(k)], []
-        for i, (structure, which) in enumerate(zip(self.structures, parts)):
-            if first:
-                ask(structure, which[:: 1 + len(which) // FIRST])
-            start = time.thread_time()
-            answers.append(ask(structure, which))
-            self.seconds[i] += (time.thread_time() - start) / len(which) * tried
-        if tried < n:
-            parts.append(np.arange(tried, n))
-            answers.append(ask(self.leader, slice(tried, n)))
-        return answers, np.argsort(np.concatenate(parts))
+        heats = HEATS[0], min(HEATS[1], n // (2 * k))
+        if k < 2 or heats[1] < 2 * heats[0]:
+            return [], [], 0
+        self._due = max(GROWTH * self.seconds, START)
+        parts, answers, done, took, field = [], [], 0, [[] for _ in range(k)], range(k)
+        for rays in heats:
+            turn = np.arange(rays * len(field)) // BLOCK % len(field)
+            for i, number in enumerate(field):
+                which, structure = done + np.flatnonzero(turn == i), self.asked(number, light)
+                if not took[number]:
+                    ask(structure, which[:: rays // FIRST])
+                start = time.thread_time()
+                answers.append(ask(structure, which))
+                took[number].append((time.thread_time() - start, len(which)))
+                parts.append(which)
+            done += len(turn)
+            close = CLOSE * min(took[number][-1][0] for number in field)
+            field = [number for number in field if took[number][-1][0] <= close]
+        for number, own in enumerate(took):
+            (few, rays), (many, more) = own[0], own[-1]
+            ray = max(many - few, 0.0) / (more - rays) if len(own) > 1 else few / rays
+            batch = max(few - ray * rays, 0.0)
+            old = self.ray[number] + self.batch[number] > 0.0               # of what was seen before a half still counts
+            self.ray[number] = 0.5 * (ray + self.ray[number]) if old else ray
+            self.batch[number] = 0.5 * (batch + self.batch[number]) if old else batch
+        return parts, answers, done
+
+    def _quickest(self, n):
+        """The number of the structure that is the quickest with n rays."""
+        seconds = [batch + ray * n for batch, ray in zip(self.batch, self.ray)]
+        return seconds.index(min(seconds))
+
+
+class OneLight:
+    """Shadow rays of a contest to one light."""
+
+    def __init__(self, contest, light):
+        self.contest, self.light = contest, light
+
+    @property
+    def follows(self):
+        """As of the contest."""
+        return self.contest.follows
+
+    def closest(self, *arguments, **more):
+        """As of a structure."""
+        return self.contest.closest(*arguments, **more, light=self.light)
+
+    def occluded(self, *arguments, **more):
+        """As of a structure."""
+        return self.contest.occluded(*arguments, **more, light=self.light)
+
+    def blockers(self, *arguments, **more):
+        """As of a structure."""
+        return self.contest.blockers(*arguments, **more, light=self.light)
 
 
 def _part(value, which):

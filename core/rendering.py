@@ -289,8 +289,8 @@ class Rendering:
                 self.scene, self._standard, (x1 - x0, y1 - y0), self.samples, depth, self.core, kinds
             )
             if self.core == "fast" and not self.count:              # counters are those of one technique
-                self._contenders = {kind: names for kind, names in chosen.items() if len(names) > 1}
-        return {kind: (chosen.get(kind, (STANDARD,))[0], {}) for kind in open_kinds}
+                self._contenders = {kind: row for kind, row in chosen.items() if len(row[0]) > 1}
+        return {kind: (chosen[kind][0][0][0] if kind in chosen else STANDARD, {}) for kind in open_kinds}
 
     def _build(self, wanted, index):
         """Build every different structure once."""
@@ -301,24 +301,26 @@ class Rendering:
             kind: None if choice is None else (choice[0], tuple(sorted(choice[1].items())))
             for kind, choice in wanted.items()
         }
-        others = {
-            kind: [
-                (name, tuple(sorted(resolve(name, technique_row(name).parameters, {}, self.core).items())))
-                for name in names[1:]
-            ]
-            for kind, names in self._contenders.items()
-        }
-        every = dict.fromkeys([*keys.values(), *(key for some in others.values() for key in some)])
-        todo = [key for key in every if key is not None and key not in built]
+        todo = list(dict.fromkeys(k for k in keys.values() if k is not None and k not in built))
         for i, key in enumerate(todo):
             report = partial(self._building, done=i, of=len(todo))
             built[key] = build(self.scene, key[0], self.core, progress=report, beside=standard, **dict(key[1]))
         self.result.structures = {kind: index if key is None else built[key] for kind, key in keys.items()}
-        for kind, some in others.items():
+        self._known = {name: own for (name, _), own in built.items()}
+        for kind, (some, expected) in self._contenders.items():
             from .contest import Contest
 
-            self.result.structures[kind] = Contest([self.result.structures[kind], *(built[key] for key in some)])
+            others = [(partial(self._tried, name), seconds) for name, seconds in some[1:]]
+            self.result.structures[kind] = Contest(self.result.structures[kind], others, expected)
         self.result.figures["T_B"] = sum(s.figures["T_B"] for s in built.values())
+
+    def _tried(self, name):
+        """A structure to try, the same for all kinds of ray."""
+        if name not in self._known:
+            self._known[name] = build(
+                self.scene, name, self.core, progress=lambda fraction: self._check(), beside=self._standard
+            )
+        return self._known[name]
 
     def _building(self, fraction, done=0, of=1):
         """The progress of a build."""

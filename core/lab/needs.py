@@ -21,7 +21,7 @@ import numpy as np
 
 from ..catalogue import build, technique, techniques
 from ..cells import cells_along
-from ..errors import RayscopeError
+from ..errors import Cancelled, RayscopeError
 from ..options import AUTOMATIC, STANDARD
 from ..parameters import resolve
 from ..scene.camera import Camera
@@ -54,14 +54,15 @@ TRUST = 3.0
 BUDGET = 0.7
 #: The whole picture must be faster than with the standard technique by this part, as the model is not exact.
 MARGIN = 0.15
-#: What may be quicker by so much than the model has it is tried while the picture is traced: so many others for a kind of
-#: ray at most, if their builds together take no more than this part of the picture's time, and each no more than this part
-#: of the time of the rays.
-DOUBT, OTHERS, TRIED, REPAID = 2.5, 2, 0.04, 0.2
-#: Techniques estimated to take this many times as long as it are not traced to compare.
-HOPELESS = 8.0
-#: Pictures are repeated to compare them until all took so long together, seconds.
-QUICK = 3.0
+#: What the model has no more than DOUBT times as slow as the choice may be tried while the picture is traced: so many OTHERS
+#: for a kind of ray, at most.
+DOUBT, OTHERS = 8.0, 3
+#: Techniques that take this many times as long as the best at half the size are not compared at the full one.
+HOPELESS = 2.0
+#: Pictures are repeated to compare them until all took so long together; if they take LONG, twice only. Seconds.
+QUICK, LONG = 6.0, 60.0
+#: What the automatic choice may take more than the best fixed one, and than STANDARD.
+BARS = (0.15, 0.1)
 #: Databases of :func:`benchmark`, with size factors that give some hundred primitives.
 DATABASES = {"balls": 2, "gears": 1, "jacks": 2, "lattice": 4, "mount": 4, "rings": 2, "teapot": 5, "tetra": 5, "tree": 7}
 #: Calibrated first: brute force tells what a test costs, which is the same for all.
@@ -533,16 +534,16 @@ def resolve_automatic(scene, index, size, samples, depth, core, kinds):
     Returns
     -------
     dict
-        Kind of ray -> names: the choice, and what may be quicker and is worth trying.
+        Kind of ray -> (name, seconds to build it): the choice, and what may be quicker; and the rays expected.
     """
     seen = survey(scene, index)
     rays = expected_rays(seen, size[0] * size[1], samples, depth)
     calls = expected_calls(seen, rays, depth)
     choice, rows = choose(seen, {kind: max(rays.get(kind, 0), 1) for kind in kinds}, core, calls)
-    return contenders(choice, rows, candidates(core)[STANDARD].shading * sum(rays.values()))
+    return {kind: (some, rays.get(kind, 0)) for kind, some in contenders(choice, rows).items()}
 
 
-def contenders(choice, rows, besides):
+def contenders(choice, rows):
     """What else may be quicker than a choice, as the model is not exact: to be found out while the picture is traced.
 
     Parameters
@@ -550,29 +551,18 @@ def contenders(choice, rows, besides):
     choice : dict
     rows : list of dict
         Both as of :func:`choose`.
-    besides : float
-        Seconds that the picture takes besides.
 
     Returns
     -------
     dict
-        Kind of ray -> names: the choice, then at most OTHERS others that are built anyway, or in a small part of the
-        picture's time.
+        Kind of ray -> list of (name, seconds to build it): the choice, then others, the quickest first; STANDARD is there.
     """
-    of = {row["technique"]: row for row in rows}
-    left = TRIED * (besides + sum(of[name][f"s {kind}"] for kind, name in choice.items()))
-    built, found = {STANDARD, *choice.values()}, {}
+    of, found = {row["technique"]: row for row in rows}, {}
     for kind, name in choice.items():
-        found[kind] = [name]
-        own = sorted((row for row in rows if f"s {kind}" in row), key=lambda row: row[f"s {kind}"])
-        for row in own:
-            other, more = row["technique"], 0.0 if row["technique"] in built else row["T_B"]
-            now = of[name][f"s {kind}"]
-            if other != name and row[f"s {kind}"] < DOUBT * now and more < min(left, REPAID * now) and len(found[kind]) <= OTHERS:
-                found[kind].append(other)
-                built.add(other)
-                left -= more
-    return {kind: tuple(names) for kind, names in found.items()}
+        key = f"s {kind}"
+        own = sorted((row for row in rows if key in row and row[key] <= DOUBT * of[name][key] and row is not of[name]), key=lambda row: row[key])
+        found[kind] = [(row["technique"], 0.0 if row["technique"] == STANDARD else row["T_B"]) for row in (of[name], *own[:OTHERS])]
+    return found
 
 
 # --- the plan ---------------------------------------------------------------------------------------------------------
@@ -757,47 +747,90 @@ def text(result):
 
 # --- was it right? ----------------------------------------------------------------------------------------------------
 
-def against_fixed(scene, size=(160, 120), core="fast", names=None, repeats=2):
-    """Trace a scene with the automatic choice and with each fixed one, `repeats` times at least.
+def against_fixed(scene, size=(160, 120), core="fast", names=None, repeats=3):
+    """Trace a scene with the automatic choice and with each fixed one, in turns.
+
+    Parameters
+    ----------
+    scene : Scene
+    size : (int, int)
+    core : {"fast", "pure"}
+    names : list of str, optional
+        Techniques; those that do not serve all kinds of ray have STANDARD beside them. If absent, all that at half the size
+        are not much slower than the best.
+    repeats : int
+        Of all, at least; more where they are quick, fewer where they take very long.
 
     Returns
     -------
     dict
         scene, choice, automatic (s of the processor, for everything), best (s), best_technique, bvh (s), over_best and over_bvh: automatic over
-        each, minus 1.
+        each, minus 1; of the least of all repeats; range: least and largest of automatic over best, minus 1, among the repeats.
     """
-    from ..rendering import trace
-    if names is None:                                                   # those that could be the best
-        rows = plan(scene, size, core=core).rows
-        standard = next(row["s"] for row in rows if row["technique"] == STANDARD)
-        names = [row["technique"] for row in rows if row["s"] < HOPELESS * standard and technique(row["technique"]).rays == KINDS]
-    choice, seconds = {}, dict.fromkeys((AUTOMATIC, *names), math.inf)
-    began = time.process_time()
-    for k in range(10):                                                 # interleaved: a busy moment hits all alike
-        if k >= repeats and time.process_time() - began > QUICK:        # small pictures are drowned in noise
+    calibration(core)
+    if names is None:
+        half, quickest, took = tuple(max(1, side // 2) for side in size), math.inf, {}
+        every = [row.name for row in techniques() if row.family not in ("peers", "generalised") and core in row.cores]
+        for name in sorted(every, key=lambda name: name != STANDARD):   # those that could be the best
+            took[name] = _traced(scene, name, core, half, HOPELESS * quickest + 0.2)[0]
+            quickest = min(quickest, took[name])
+        names = [name for name, seconds in took.items() if seconds <= HOPELESS * quickest]
+    names = list(dict.fromkeys((STANDARD, *names)))
+    choice, rounds, began = {}, [], time.process_time()
+    for k in range(12):                                                 # interleaved: a busy moment hits all alike
+        spent = time.process_time() - began
+        if k >= repeats and spent > QUICK or k >= 2 and spent > LONG:   # small pictures are drowned in noise
             break
-        for name in seconds:
-            start = time.process_time()                                 # not the clock: others may use the processor too
-            result = trace(scene, name, core, size)
-            choice = {k: s.technique.name for k, s in result.structures.items()} if name == AUTOMATIC else choice
-            seconds[name] = min(seconds[name], time.process_time() - start)
-    best = min(names, key=seconds.get)
-    return {"scene": scene.name, "choice": " ".join(f"{k}={v}" for k, v in choice.items()), AUTOMATIC: seconds[AUTOMATIC], "best": seconds[best],
-            "best_technique": best, STANDARD: seconds[STANDARD], "over_best": seconds[AUTOMATIC] / seconds[best] - 1.0,
-            "over_bvh": seconds[AUTOMATIC] / seconds[STANDARD] - 1.0}
+        rounds.append({})
+        for name in (AUTOMATIC, *names):
+            rounds[-1][name], result = _traced(scene, name, core, size)
+            choice = {kind: s.technique.name for kind, s in result.structures.items()} if name == AUTOMATIC else choice
+    least = {name: min(row[name] for row in rounds) for name in rounds[0]}
+    best = min(names, key=least.get)
+    ratios = [row[AUTOMATIC] / row[best] - 1.0 for row in rounds]
+    return {"scene": scene.name, "choice": " ".join(f"{k}={v}" for k, v in choice.items()), AUTOMATIC: least[AUTOMATIC], "best": least[best],
+            "best_technique": best, STANDARD: least[STANDARD], "over_best": least[AUTOMATIC] / least[best] - 1.0,
+            "over_bvh": least[AUTOMATIC] / least[STANDARD] - 1.0, "range": f"{min(ratios):+.0%} .. {max(ratios):+.0%}"}
 
 
-def benchmark(size=(160, 120), core="fast", repeats=2, say=lambda line: None):
-    """The automatic choice against the best fixed one and STANDARD, on the standard procedural databases.
+def _traced(scene, name, core, size, most=math.inf):
+    """Seconds of the processor for a picture, and the Result; infinity if it takes more than `most`."""
+    from ..rendering import trace
+    start = time.process_time()                                         # not the clock: others may use the processor too
+
+    def stop(fraction):
+        if time.process_time() - start > most:
+            raise Cancelled("stopped.")
+
+    rays = KINDS if name == AUTOMATIC else technique(name).rays
+    own = {} if rays == KINDS else {kind: name for kind in rays}
+    try:
+        result = trace(scene, STANDARD if own else name, core, size, progress=None if math.isinf(most) else stop, **own)
+    except Cancelled:
+        return math.inf, None
+    return (math.inf if result.cancelled else time.process_time() - start), result
+
+
+def benchmark(scenes=(), size=(160, 120), core="fast", repeats=3, say=lambda line: None):
+    """The automatic choice against the best fixed one and STANDARD, on the standard procedural databases and more scenes.
+
+    Parameters
+    ----------
+    scenes : iterable of Scene
+    size, core, repeats
+        As of :func:`against_fixed`.
+    say : callable
 
     Returns
     -------
-    list of dict
-        Rows of :func:`against_fixed`.
+    rows : list of dict
+        Of :func:`against_fixed`.
+    missed : list of str
+        Scenes where it took over BARS longer.
     """
     from ..scene.spd import spd
     rows = []
-    for name, factor in DATABASES.items():
-        say(name)
-        rows.append(against_fixed(spd(name, factor), size, core, repeats=repeats))
-    return rows
+    for scene in itertools.chain((spd(name, factor) for name, factor in DATABASES.items()), scenes):
+        rows.append(against_fixed(scene, size, core, repeats=repeats))
+        say(f"{scene.name}: {rows[-1]['over_best']:+.0%} over {rows[-1]['best_technique']}, {rows[-1]['over_bvh']:+.0%} over {STANDARD}")
+    return rows, [row["scene"] for row in rows if row["over_best"] > BARS[0] or row["over_bvh"] > BARS[1]]

@@ -195,7 +195,7 @@ def test_kinds_of_rays_have_techniques_of_their_own(scene, monkeypatch):
     settings.technique, settings.shadow = "grid", "light-buffer"
     assert used() == ("grid", "light-buffer")
     settings.primary = settings.shadow = "automatic"
-    monkeypatch.setattr("bl_ext.user_default.rayscope.core.lab.needs.resolve_automatic", lambda *a: {"primary": ("octree",), "shadow": ("kd-tree",)})
+    monkeypatch.setattr("bl_ext.user_default.rayscope.core.lab.needs.resolve_automatic", lambda *a: {"primary": ([("octree", 0.0)], 9), "shadow": ([("kd-tree", 0.0)], 9)})
     assert used() == ("octree", "kd-tree")
     items = {kind: {i.identifier for i in settings.bl_rna.properties[kind].enum_items} for kind in ("primary", "secondary", "shadow")}
     assert "image-directory" in items["primary"] and "image-directory" not in items["shadow"]

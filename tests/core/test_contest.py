@@ -43,11 +43,18 @@ def built():
     return [build(SCENE, name) for name in ("bvh", "grid", "ray-coherence")]
 
 
-@pytest.mark.parametrize("n", [1, 700, 9000])
+def _contest(structures, expected):
+    """A contest that tries as soon as it may."""
+    contest = Contest(structures[0], [(lambda s=s: s, 0.0) for s in structures[1:]], expected)
+    contest._due = 0.0
+    return contest
+
+
+@pytest.mark.parametrize("n", [1, 1600, 9000])
 def test_answers_are_those_of_any(built, n):
     for rays in ray_sets(SCENE, built[0], n, 0):
-        contest = Contest(built)
-        for _ in range(3):
+        contest = _contest(built, 10**9)
+        for _ in range(4):
             if rays.kind == "shadow":
                 far = np.linspace(0.1, 1.0, n)                          # one for each ray
                 blocked, counts = contest.occluded(rays.origins, rays.directions, t_max=far, count=True, leaving=rays.leaving)
@@ -60,28 +67,60 @@ def test_answers_are_those_of_any(built, n):
 
 
 def test_the_quickest_gets_the_rays(built):
-    slow, quick = Slow(built[0], 2e-4), Slow(built[1], 0.0)
-    contest = Contest([slow, quick])
-    rays = ray_sets(SCENE, built[0], 4000, 0)[0]
-    for _ in range(20):
-        rays.ask(contest)
-    assert contest.leader is quick and contest.technique.name == "grid"
-    # Three trials, of 1000 rays each at first: at 4,000, at 20,000 and at 80,000 of them.
-    assert slow.rays < 0.1 * 80_000 and quick.rays > 0.9 * 80_000
-    few = Contest([slow, quick])
-    rays.take(slice(0, 500)).ask(few)
-    assert few.leader is slow and few.seconds == [0.0, 0.0]            # too few for a trial
-
-
-def test_each_light_has_its_own(built):
-    near, far = Light("near", "point", (1, 1, 1), (2.0, 0.0, 0.0)), Light("far", "point", (1, 1, 1), (9.0, 0.0, 0.0))
     slow, quick = Slow(built[0], 1e-4), Slow(built[1], 0.0)
-    contest = Contest([slow, quick])
-    own = contest.for_light(near)
-    assert own is contest.for_light(near) and own is not contest.for_light(far)
-    rays = ray_sets(SCENE, built[0], 4000, 0)[2]
-    rays.ask(own)
-    assert own.leader is quick and contest.leader is quick             # by what was seen at its lights
+    contest = Contest(slow, [(lambda: quick, 0.01)], 200_000)
+    rays = ray_sets(SCENE, built[0], 8000, 0)[0]
+    for k in range(12):
+        rays.ask(contest)
+        if not k:
+            assert contest.leader is slow and not quick.rays            # no trial at once
+    assert contest.leader is quick and contest.technique.name == "grid"
+    assert slow.rays < 8000 + 5000 and slow.rays + quick.rays < 12 * 8000 + 200
+
+
+def test_too_few_rays_are_no_trial(built):
+    slow, quick = Slow(built[0], 1e-4), Slow(built[1], 0.0)
+    rays = ray_sets(SCENE, built[0], 4000, 0)[0]
+    soon = Contest(slow, [(lambda: quick, 0.0)], 6000)
+    dear = Contest(slow, [(lambda: quick, 1.0)], 100_000)
+    short = _contest([slow, quick], 100_000)
+    for _ in range(2):
+        rays.ask(soon)                                                  # there is no more to come
+        rays.ask(dear)                                                  # its build would take longer than the rays so far
+        rays.take(slice(0, 900)).ask(short)                             # too few at once
+    assert not quick.rays and soon.leader is dear.leader is short.leader is slow
+
+
+def test_a_batch_counts_as_well_as_a_ray(built):
+    """What is slow to begin with, but quick with many rays, gets many rays, and no few."""
+    class Heavy(Slow):
+        def _ask(self, method, arguments):
+            until = time.thread_time() + 0.02
+            while time.thread_time() < until:
+                pass
+            return super()._ask(method, arguments)
+
+    heavy, light = Heavy(built[0], 0.0), Slow(built[1], 2e-5)
+    contest = _contest([light, heavy], 10**9)
+    rays = ray_sets(SCENE, built[0], 8000, 0)[0]
+    rays.ask(contest)
+    contest._due, before = np.inf, light.rays
+    rays.ask(contest)
+    assert light.rays == before and contest.structures[contest._quickest(8000)] is heavy
+    rays.take(slice(0, 100)).ask(contest)
+    assert light.rays == before + 100
+
+
+def test_lights_share_a_contest(built):
+    lights = [Light(f"light {k}", "point", (1, 1, 1), (2.0 + k, 0.0, 0.0)) for k in range(2)]
+    slow, quick = Slow(built[0], 1e-4), Slow(built[1], 0.0)
+    contest = _contest([slow, quick], 10**9)
+    rays = ray_sets(SCENE, built[0], 8000, 0)[2]
+    rays.ask(contest.for_light(lights[0]))
+    assert contest.leader is quick
+    contest._due, before = np.inf, slow.rays
+    rays.ask(contest.for_light(lights[1]))
+    assert slow.rays == before
 
 
 def test_pictures_are_the_same(monkeypatch):
@@ -90,7 +129,9 @@ def test_pictures_are_the_same(monkeypatch):
                   [Light(f"lamp {k}", "point", (0.5, 0.5, 0.5), (2.0 - 4.0 * k, -3.0, 3.0)) for k in range(2)],
                   Camera.look_at((3.0, -3.0, 2.0), (0.0, 0.0, 0.0)))
     names = {"primary": ("grid", "image-directory", "bvh"), "secondary": ("bvh", "grid"), "shadow": ("bvh", "light-buffer")}
-    monkeypatch.setattr("rayscope.core.lab.needs.resolve_automatic", lambda *a: names)
+    monkeypatch.setattr("rayscope.core.lab.needs.resolve_automatic", lambda *a: {k: ([(n, 0.0) for n in some], 10**9) for k, some in names.items()})
+    monkeypatch.setattr("rayscope.core.contest.START", 0.0)
+    monkeypatch.setattr("rayscope.core.contest.GROWTH", 0.0)            # a trial with every batch
     picture, fixed = (trace(scene, name, size=(90, 70)) for name in ("automatic", "bvh"))
     assert np.array_equal(picture.image, fixed.image)
     assert all(picture.structures[kind].technique.name in some for kind, some in names.items())
@@ -101,9 +142,9 @@ def test_pictures_are_the_same(monkeypatch):
     assert np.array_equal(counted.passes["n_it"], one.passes["n_it"])
 
 
-def test_what_may_be_quicker_is_tried_if_its_build_is_short():
+def test_what_may_be_quicker_takes_part():
     rows = [{"technique": name, "T_B": build, "s primary": seconds, "s": 0.0} for name, build, seconds in (
         ("bvh", 0.1, 2.0), ("grid", 0.05, 1.0), ("octree", 0.05, 2.2), ("kd-tree", 9.0, 1.5), ("brute", 0.001, 400.0), ("macro-grid", 0.06, 2.4))]
-    assert needs.contenders({"primary": "bvh"}, rows, 3.0) == {"primary": ("bvh", "grid", "octree")}     # 0.2 s, two others
-    assert needs.contenders({"primary": "bvh"}, rows, 0.1) == {"primary": ("bvh", "grid")}
-    assert needs.contenders({"primary": "grid"}, rows, 0.0) == {"primary": ("grid", "bvh")}              # which is there
+    assert needs.contenders({"primary": "bvh"}, rows) == {"primary": [("bvh", 0.0), ("grid", 0.05), ("kd-tree", 9.0), ("octree", 0.05)]}
+    assert needs.contenders({"primary": "grid"}, rows)["primary"][:3] == [("grid", 0.05), ("kd-tree", 9.0), ("bvh", 0.0)]
+    assert needs.contenders({"primary": "grid"}, [rows[1], rows[4]]) == {"primary": [("grid", 0.05)]}
