@@ -10,6 +10,8 @@ from .memory import free_memory
 SUPPORTED = ("triangle", "polygon", "instance")
 #: Bytes that a fragment takes, about, with all that is made of it on the way.
 BYTES = 2_000
+#: Points of a pixel at which it is sampled by rays what beams do not know.
+SAMPLES = 16
 #: Width in pixels of the picture that the overlay's tree is made for.
 WIDTH = 640
 

@@ -8,15 +8,16 @@ in smooth-shaded (curved) mirrors and in glass at grazing angles, soft shadows, 
 
 import numpy as np
 
-from ...beams import fragments_notice
+from ...beams import SAMPLES, fragments_notice
 from ..tracing import sampling
 from ..tracing.secondary import mirrored_and_refracted
 from ..tracing.whitted import KINDS, PRIMARY, REFLECTED, REFRACTED, TRANSPARENT, Wave, Whitted
 from .beam_clip import in_pixels
 from .beam_walk import SKY
+from .outlines import scattered
 
-#: Rays for a whole pixel of what beams do not know.
-SAMPLES = 16
+#: Pieces whose pixels' points are looked at together.
+ROWS = 4096
 #: Shadowed parts of pixels smaller than this are not looked at.
 LEAST = 1e-9
 
@@ -222,33 +223,58 @@ class BeamTracer(Whitted):
         out["object_index"][pixel], out["primitive_index"][pixel] = hits.object, hits.primitive
 
     def _keys(self, pixel, beam, surface, sample=0):
-        """Keys of random numbers."""
-        y, x = np.divmod(pixel, self.width)
-        key = sampling.first_key((y + self.corner[1]) * self.size[0] + x + self.corner[0], sample, self.seed)
-        return sampling.mix(key + self.tree.key(beam, surface).astype(np.uint64))
+        """Keys of random numbers, the same in both cores."""
+        beams = self.tree.beams
+        own = ((surface + 2) * 1024 + beams.depth[beam]) * 8 + beams.kind[beam]
+        return sampling.mix(self._pixel_keys(pixel, sample) + own.astype(np.uint64))
 
-    def _samples(self, pieces, some):
-        """Random points in pieces, by their area: piece, xy, share of the pixel, key."""
-        number = np.maximum(np.ceil(SAMPLES * pieces.area[some] - 1e-9), 1.0).astype(np.int64)
-        which = np.repeat(some, number)
-        sample = np.arange(len(which)) - np.repeat(np.cumsum(number) - number, number)
-        key = self._keys(pieces.pixel[which], pieces.beam[which], pieces.surface[which], sample)
-        # Pieces of one surface in a pixel are told apart by which fragment they are of.
-        key = sampling.mix(key + pieces.polygon[which].astype(np.uint64))
-        u, v = sampling.number(key, sampling.PIXEL), sampling.number(key, sampling.PIXEL + 1)
-        points = pieces.points[which]
-        e, f = points[:, 1:-1] - points[:, :1], points[:, 2:] - points[:, :1]
-        total = np.cumsum(np.maximum(e[..., 0] * f[..., 1] - e[..., 1] * f[..., 0], 0.0), axis=1)
-        # A triangle of the fan by its area; what is left of u is random still.
-        u = u * total[:, -1]
-        fan = (total <= u[:, None]).sum(axis=1).clip(max=total.shape[1] - 1)
-        row = np.arange(len(which))
-        before = np.where(fan > 0, total[row, fan - 1], 0.0)
-        size = total[row, fan] - before
-        root = np.sqrt(np.clip((u - before) / np.where(size > 0.0, size, 1.0), 0.0, 1.0))
-        xy = points[:, 0] + root[:, None] * ((1.0 - v)[:, None] * e[row, fan] + v[:, None] * f[row, fan])
-        share = pieces.area[which] / np.repeat(number, number)
-        return which, xy, share, key
+    def _pixel_keys(self, pixel, sample=0):
+        """Keys of pixels, or of their samples."""
+        y, x = np.divmod(pixel, self.width)
+        return sampling.first_key((y + self.corner[1]) * self.size[0] + x + self.corner[0], sample, self.seed)
+
+    def _samples(self, pieces, some, cut_off=False):
+        """Points of the pixels that lie in pieces, each with as much of the area of all pieces of its beam and surface.
+
+        Where such pieces contain none, it is their centre. `cut_off` tells pieces of one beam and surface apart.
+
+        Returns
+        -------
+        which : ndarray, shape (m,)
+            A piece of the beam and surface.
+        xy, share, key : ndarray
+        """
+        n = self.radiance.shape[1]
+        own = 2 * (self.tree.key(pieces.beam[some], pieces.surface[some]) * n + pieces.pixel[some]) + cut_off
+        _, place, group = np.unique(own, return_index=True, return_inverse=True)
+        group, m = group.ravel(), len(place)
+        area = np.bincount(group, pieces.area[some], m)
+        inside = np.zeros((m, SAMPLES + 1), bool)
+        where = np.zeros((m, SAMPLES + 1, 2))
+        where[:, SAMPLES] = np.stack(
+            [np.bincount(group, pieces.area[some] * pieces.centre[some, c], m) / area for c in range(2)], axis=1
+        )
+        where[:, :SAMPLES] = self._points(pieces, some[place])
+        for i in range(0, len(some), ROWS):
+            part, mine = some[i : i + ROWS], group[i : i + ROWS]
+            points = pieces.points[part]
+            step = np.roll(points, -1, axis=1) - points
+            off = where[mine, :SAMPLES, None] - points[:, None]
+            turn = step[:, None, :, 0] * off[..., 1] - step[:, None, :, 1] * off[..., 0]
+            row, k = np.nonzero((turn >= 0.0).all(axis=2))
+            inside[mine[row], k] = True
+        inside[:, SAMPLES] = ~inside.any(axis=1)
+        row, k = np.nonzero(inside)
+        which = some[place[row]]
+        key = self._keys(pieces.pixel[which], pieces.beam[which], pieces.surface[which], k)
+        return which, where[row, k], (area / inside.sum(axis=1))[row], key
+
+    def _points(self, pieces, some):
+        """The points at which pixels of some pieces are sampled, shape (m, SAMPLES, 2)."""
+        key = self._pixel_keys(pieces.pixel[some])
+        u, v = (sampling.number(key, sampling.PIXEL + c)[:, None] for c in range(2))
+        s, t = scattered(False, np.arange(SAMPLES), SAMPLES, u, v)
+        return np.stack([pieces.x[some, None] + 0.5 * (s + 1.0), pieces.y[some, None] + 0.5 * (t + 1.0)], axis=-1)
 
     def _unknown(self, pieces, some):
         """Rays where it is not known what is seen: a primary wave, and a list of others."""
@@ -256,7 +282,7 @@ class BeamTracer(Whitted):
             return []
         tree, camera = self.tree, self.scene.camera
         which, xy, share, key = self._samples(pieces, some)
-        key = sampling.branch(key, 0) if self.soft or self.roulette else None
+        key = key if self.soft or self.roulette else None
         beam, pixel = pieces.beam[which], pieces.pixel[which]
         first = np.flatnonzero(tree.beams.parent[beam] < 0)
         waves = []
@@ -282,11 +308,12 @@ class BeamTracer(Whitted):
         tree = self.tree
         cut_off = pieces.polygon[some] >= tree.followed
         sampled = np.isin(tree.key(pieces.beam[some], pieces.surface[some]), tree.sampled)
-        some = some[cut_off | sampled]
+        rest = cut_off | sampled
+        some = some[rest]
         if not len(some):
             return []
-        which, xy, share, key = self._samples(pieces, some)
-        key = sampling.branch(key, 0) if self.soft or self.roulette else None
+        which, xy, share, key = self._samples(pieces, some, cut_off[rest])
+        key = key if self.soft or self.roulette else None
         wave, hits, at = self._as_wave(pieces.beam[which], pieces.surface[which], xy, share, pieces.pixel[which], key)
         kinds = (REFLECTED, REFRACTED)
         waves = self._going_on(wave, hits, at, np.flatnonzero(wave.depth < self.depth), kinds)

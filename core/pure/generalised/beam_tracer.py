@@ -9,7 +9,7 @@ in smooth-shaded (curved) mirrors and in glass at grazing angles, soft shadows, 
 import math
 from dataclasses import dataclass
 
-from ...beams import fragments_notice
+from ...beams import SAMPLES, fragments_notice
 from ..tracing import sampling
 from ..tracing.camera import through
 from ..tracing.secondary import mirrored_and_refracted
@@ -19,9 +19,8 @@ from .beam_clip import in_pixels
 from .beam_space import height
 from .beam_tree import share
 from .beam_walk import SKY
+from .outlines import scattered
 
-#: Rays for a whole pixel of what beams do not know.
-SAMPLES = 16
 #: Shadowed parts of pixels smaller than this are not looked at.
 LEAST = 1e-9
 
@@ -46,6 +45,35 @@ class Seen:
     area: float
     first: tuple
     lit: dict
+
+
+@dataclass(slots=True)
+class Loose:
+    """What a pixel sees in a beam that must be sampled by rays.
+
+    Attributes
+    ----------
+    fragment : Fragment
+        One of those of this beam and surface.
+    cut_off : bool
+        Whether nothing was made of it for lack of room.
+    area : float
+    first : tuple of 2 float
+        Integral of x and y.
+    polygons : list of list of tuple
+        Where it is seen.
+    """
+
+    fragment: object
+    cut_off: bool
+    area: float
+    first: tuple
+    polygons: list
+
+    def points(self, places):
+        """(number, xy) of the points that lie in it; where none does, of its centre."""
+        found = [(k, p) for k, p in enumerate(places) if any(_depth(polygon, p) >= 0.0 for polygon in self.polygons)]
+        return found or [(len(places), (self.first[0] / self.area, self.first[1] / self.area))]
 
 
 class BeamTracer(Whitted):
@@ -98,7 +126,7 @@ class BeamTracer(Whitted):
         for y in range(y0, y1):
             for x in range(x0, x1):
                 self.check()
-                for name, value in self._pixel(x, y, seen.get((x, y), {}), loose.get((x, y), ()), middle.get((x, y))).items():
+                for name, value in self._pixel(x, y, seen.get((x, y), {}), loose.get((x, y), {}), middle.get((x, y))).items():
                     out.setdefault(name, []).append(value)
         return out
 
@@ -109,8 +137,8 @@ class BeamTracer(Whitted):
         -------
         seen : dict of dict
             (beam, surface) -> Seen.
-        loose : dict of list
-            (number of the fragment, fragment, area, points) of the pieces from which rays are to be sent.
+        loose : dict of dict
+            (beam, surface, whether nothing was made of it) -> Loose.
         middle : dict of Fragment
             What the eye sees at the centre.
         """
@@ -125,7 +153,12 @@ class BeamTracer(Whitted):
                     own.area += area
                     own.first = own.first[0] + area * centre[0], own.first[1] + area * centre[1]
                 if sampled and f.surface != SKY:
-                    loose.setdefault((x, y), []).append((number, f, area, points))
+                    cut_off = number >= tree.followed
+                    fresh = Loose(f, cut_off, 0.0, (0.0, 0.0), [])
+                    own = loose.setdefault((x, y), {}).setdefault((*key, cut_off), fresh)
+                    own.area += area
+                    own.first = own.first[0] + area * centre[0], own.first[1] + area * centre[1]
+                    own.polygons.append(points)
                 if f.beam.kind == PRIMARY:
                     depth = _depth(points, (x + 0.5, y + 0.5))
                     if depth > deepest.get((x, y), -math.inf):
@@ -142,16 +175,14 @@ class BeamTracer(Whitted):
         """The values of a pixel; named as in :meth:`Whitted.tile`."""
         self.spent = dict.fromkeys(("rays_per_pixel", *(("n_it", "n_ts") if self.count else ())), 0)
         radiance = (0.0, 0.0, 0.0)
-        pixel = sampling.first_key(y * self.size[0] + x, 0, self.seed)
-        for k, own in enumerate(seen.values()):
-            radiance = add(radiance, self._seen_of(own, sampling.mix((pixel + k) & sampling.MASK)))
-        stack = []
-        for number, f, area, points in loose:
-            n = max(math.ceil(SAMPLES * area - 1e-9), 1)
-            for i in range(n):
-                key = sampling.first_key(y * self.size[0] + x, i, self.seed)
-                own = sampling.mix((key + number) & sampling.MASK)
-                stack += self._rays_for(f, number, _random_point(points, key), area / n, own)
+        for own in seen.values():
+            radiance = add(radiance, self._seen_of(own, self._key(x, y, own.beam, own.surface)))
+        stack, places = [], self._points(x, y) if loose else []
+        for own in loose.values():
+            f, points = own.fragment, own.points(places)
+            for k, xy in points:
+                key = self._key(x, y, f.beam, f.surface, k)
+                stack += self._rays_for(f, own.cut_off, xy, own.area / len(points), key)
         while stack:
             for path, hit, surface in self._met(stack.pop()):
                 if surface is None:
@@ -162,6 +193,18 @@ class BeamTracer(Whitted):
                 stack += self._onward(path, hit, surface)
         first = self._first(*self._at_middle(middle, (x + 0.5, y + 0.5)))
         return {"combined": radiance, **self.spent, **first}
+
+    def _key(self, x, y, beam, surface, sample=0):
+        """Key of random numbers, the same in both cores."""
+        key = sampling.first_key(y * self.size[0] + x, sample, self.seed)
+        return sampling.mix((key + ((surface + 2) * 1024 + beam.depth) * 8 + beam.kind) & sampling.MASK)
+
+    def _points(self, x, y):
+        """The points at which a pixel is sampled."""
+        key = sampling.first_key(y * self.size[0] + x, 0, self.seed)
+        u, v = sampling.number(key, sampling.PIXEL), sampling.number(key, sampling.PIXEL + 1)
+        places = (scattered(False, k, SAMPLES, u, v) for k in range(SAMPLES))
+        return [(x + 0.5 * (s + 1.0), y + 0.5 * (t + 1.0)) for s, t in places]
 
     def _seen_of(self, own, key):
         """What a pixel gets of a surface: emission, ambient light, and what the lights do; or of the sky."""
@@ -211,7 +254,7 @@ class BeamTracer(Whitted):
         hit.t = dot(minus(hit.point, position), forward)
         return hit, surface
 
-    def _rays_for(self, fragment, number, xy, part, key):
+    def _rays_for(self, fragment, cut_off, xy, part, key):
         """Yield rays through a point of a fragment, for what beams do not know; `part` is their part of the pixel."""
         tree, beam = self.tree, fragment.beam
         key = key if self.soft or self.roulette else None
@@ -219,7 +262,7 @@ class BeamTracer(Whitted):
             path, surface = self._as_path(beam, fragment.surface, xy, part, key)
             if surface.material.reflects and path.depth < self.depth:
                 yield from self._going_on(path, surface, (REFLECTED, REFRACTED))
-            if number >= tree.followed:
+            if cut_off:
                 yield from self._going_on(path, surface, (TRANSPARENT,))
         elif beam.parent is None:
             camera = self.scene.camera
@@ -256,20 +299,3 @@ def _depth(points, p):
         if size > 0.0:
             depth = min(depth, ((x1 - x) * (p[1] - y) - (y1 - y) * (p[0] - x)) / size)
     return depth
-
-
-def _random_point(points, key):
-    """A point of a polygon, uniform by area: in a triangle of its fan."""
-    u, v = sampling.number(key, sampling.PIXEL), sampling.number(key, sampling.PIXEL + 1)
-    (x, y), *rest = points
-    fans = []
-    for (bx, by), (cx, cy) in zip(rest, rest[1:]):
-        e, f = (bx - x, by - y), (cx - x, cy - y)
-        fans.append((max(e[0] * f[1] - e[1] * f[0], 0.0), e, f))
-    u *= sum(size for size, _, _ in fans)
-    for size, e, f in fans:
-        if u < size or (size, e, f) == fans[-1]:
-            break
-        u -= size
-    root = math.sqrt(min(max(u / size, 0.0), 1.0)) if size > 0.0 else 0.0
-    return x + root * ((1.0 - v) * e[0] + v * f[0]), y + root * ((1.0 - v) * e[1] + v * f[1])
