@@ -64,15 +64,15 @@ class BspTree(CellTree):
         m, cell, n = len(cells.count), cells.cell, cells.count
         tolerance = TOLERANCE * self.margin
         best, plane = np.full(m, np.inf), np.full((4, m), np.inf)
-        for normal, distance in self._candidates(cells, cell):
+        for normal, distance, extents in self._candidates(cells, cell):
             self.tick()
-            low, high = self._extent(cells, normal.take(cell, axis=1))
+            low, high = extents or self._extent(cells, normal.take(cell, axis=1))
             w = distance.take(cell)
             below, above = low < w - tolerance, high > w + tolerance
-            left, right, inside = (np.bincount(cell[some], minlength=m) for some in (below, above, ~(below | above)))
+            left, right, inside = (_sums(some, n) for some in (below, above, ~(below | above)))
             lo, hi = self._boxes(cells, np.concatenate([normal, distance[None]]))
-            area = box_area(lo, hi)
-            score = area[0::3] * left + area[1::3] * inside + area[2::3] * right
+            below, between, above = box_area(lo.T, hi.T)
+            score = below * left + between * inside + above * right
             # No part may have them all: the plane of polygons that lie in one plane divides nothing.
             better = (score < best) & (np.maximum(np.maximum(left, right), inside) < n) & np.isfinite(distance)
             best = np.where(better, score, best)
@@ -97,7 +97,7 @@ class BspTree(CellTree):
         child = np.concatenate([3 * cell[ref] + part for part, ref in parts])
         order = np.argsort(child, kind="stable")
         ref, child = np.concatenate(refs)[order], child[order]
-        lo, hi = self._boxes(cells, plane)
+        lo, hi = (x.T.reshape(3 * m, 3) for x in self._boxes(cells, plane))
         count = np.bincount(child, minlength=3 * m)
         area = box_area(cells.lo, cells.hi)
         cost = 1.0 + (box_area(lo, hi) * count).reshape(-1, 3).sum(axis=1) / np.where(area > 0.0, area, 1.0)
@@ -108,24 +108,29 @@ class BspTree(CellTree):
         )
 
     def _candidates(self, cells, cell):
-        """Planes to try, one a cell: (normal (3, m), distance (m,))."""
+        """Planes to try, one a cell: (normal (3, m), distance (m,), extents along the normals where they are known)."""
         m, first = len(cells.count), np.cumsum(cells.count) - cells.count
         if self.planes == "polygons":
             for k in range(CANDIDATES):
                 # Evenly from the cell's list.
                 ref = first + k * cells.count // CANDIDATES
-                corners, number = cells.more[0][ref], cells.more[1][ref]
-                a, e, f = corners[:, 0].T, (corners[:, 1] - corners[:, 0]).T, (corners[:, 2] - corners[:, 0]).T
+                number = cells.more[1].take(ref)
+                a, e, f = (corner.take(ref, axis=1) for corner in self._columns(cells)[0][:3])
+                e, f = e - a, f - a
                 normal = np.stack([e[1] * f[2] - e[2] * f[1], e[2] * f[0] - e[0] * f[2], e[0] * f[1] - e[1] * f[0]])
                 length = np.sqrt(normal[0] * normal[0] + normal[1] * normal[1] + normal[2] * normal[2])
                 good = (number > 0) & (length > 0.0) & np.isfinite(length)
                 normal = normal / np.where(good, length, 1.0)
-                yield normal, np.where(good, normal[0] * a[0] + normal[1] * a[1] + normal[2] * a[2], np.inf)
+                yield normal, np.where(good, normal[0] * a[0] + normal[1] * a[1] + normal[2] * a[2], np.inf), None
         for direction in self.directions:
             normal = np.repeat(direction[:, None], m, axis=1)
             low, high = self._extent(cells, normal.take(cell, axis=1))
             centre = 0.5 * low + 0.5 * high
-            yield normal, centre[np.lexsort([centre, cell])[first + cells.count // 2]]
+            order = np.argsort(centre)
+            # Few cells have short numbers, which are sorted digit by digit.
+            own = cell.astype(np.min_scalar_type(m)).take(order)
+            order = order.take(np.argsort(own, kind="stable").take(first + cells.count // 2))
+            yield normal, centre.take(order), (low, high)
 
     def _extent(self, cells, normal):
         """Extents of fragments, or of whole primitives, along directions, columns."""
@@ -165,32 +170,31 @@ class BspTree(CellTree):
 
     @staticmethod
     def _boxes(cells, plane):
-        """Boxes around the parts of boxes below, in and above planes: (lo, hi), each (3 m, 3)."""
+        """Boxes around the parts of boxes below, in and above planes: (lo, hi), each (axis, part, m)."""
         m = len(cells.count)
-        lo, hi = np.repeat(cells.lo[:, None], 3, axis=1), np.repeat(cells.hi[:, None], 3, axis=1)
         divided = np.isfinite(plane[3])
-        n, w = np.where(divided, plane[:3], 0.0).T, np.where(divided, plane[3], 0.0)
-        least, most = np.minimum(n * cells.lo, n * cells.hi), np.maximum(n * cells.lo, n * cells.hi)
+        n, w = np.where(divided, plane[:3], 0.0), np.where(divided, plane[3], 0.0)
+        box_lo, box_hi = np.ascontiguousarray(cells.lo.T), np.ascontiguousarray(cells.hi.T)
+        least, most = np.minimum(n * box_lo, n * box_hi), np.maximum(n * box_lo, n * box_hi)
+        lo, hi = np.empty((2, 3, 3, m))
         with np.errstate(divide="ignore", invalid="ignore"):
             for axis in range(3):
-                others = [a for a in range(3) if a != axis]
+                b, c = (a for a in range(3) if a != axis)
                 # n x <= w, and n x >= w, for the rest of the sum as small, and as large, as it can be.
-                upper = (w - least[:, others[0]] - least[:, others[1]]) / n[:, axis]
-                lower = (w - most[:, others[0]] - most[:, others[1]]) / n[:, axis]
-                rising, falling = n[:, axis] > 0.0, n[:, axis] < 0.0
-                for part, below, above in ((0, True, False), (1, True, True), (2, False, True)):
-                    for limit, use in ((upper, below), (lower, above)):
-                        if not use:
-                            continue
-                        # n x <= w bounds x from above where n > 0; n x >= w does where n < 0.
-                        top = rising if limit is upper else falling
-                        bottom = falling if limit is upper else rising
-                        hi[:, part, axis] = np.where(top, np.minimum(hi[:, part, axis], limit), hi[:, part, axis])
-                        lo[:, part, axis] = np.where(bottom, np.maximum(lo[:, part, axis], limit), lo[:, part, axis])
-        # A plane that only touches the box leaves a part without extent: let it stay inside the box.
-        lo, hi = np.minimum(lo, cells.hi[:, None]), np.maximum(hi, cells.lo[:, None])
-        lo, hi = np.minimum(lo, hi), np.maximum(lo, hi)
-        return lo.reshape(3 * m, 3), hi.reshape(3 * m, 3)
+                upper, lower = (w - least[b] - least[c]) / n[axis], (w - most[b] - most[c]) / n[axis]
+                rising, falling = n[axis] > 0.0, n[axis] < 0.0
+                low, high = lo[axis], hi[axis]
+                # n x <= w bounds x from above where n > 0; n x >= w does where n < 0.
+                np.minimum(box_hi[axis], np.where(rising, upper, np.inf), out=high[0])
+                np.minimum(box_hi[axis], np.where(falling, lower, np.inf), out=high[2])
+                np.maximum(box_lo[axis], np.where(falling, upper, -np.inf), out=low[0])
+                np.maximum(box_lo[axis], np.where(rising, lower, -np.inf), out=low[2])
+                np.minimum(high[0], high[2], out=high[1])
+                np.maximum(low[0], low[2], out=low[1])
+                # A plane that only touches the box leaves a part without extent: let it stay inside the box.
+                np.minimum(low, box_hi[axis], out=low)
+                np.maximum(high, box_lo[axis], out=high)
+        return np.minimum(lo, hi), np.maximum(lo, hi)
 
     def visit_all(self, rays, ray, t_in, t_end, visits, query):
         """The walk of some rays, depth first, nearer parts first."""
@@ -242,6 +246,12 @@ class BspTree(CellTree):
         for start in range(0, len(ray), RAYS):
             some = ray[start : start + RAYS]
             self.visit_all(rays, some, t_in[some], t_out[some], visits, query)
+
+
+def _sums(mask, count):
+    """How many are set of each run of `count` entries."""
+    ends = np.cumsum(count)
+    return np.diff(np.cumsum(mask)[ends - 1], prepend=0)
 
 
 def _cut(corners, number, normal, w):
