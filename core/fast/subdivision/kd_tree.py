@@ -22,8 +22,8 @@ REFERENCES = 131_072
 EVENTS = 65_536
 #: Pairs of a primitive and a cell clipped together.
 PAIRS = 16_384
-#: Sorts behind the ends of all boxes, two of it as one number; is more than any cost.
-BEHIND, NEVER = np.int32(2**31 - 1), 2.0**60
+#: Sorts behind the ends of all boxes, two of it as one number; the bit that is more than any number of boxes.
+BEHIND, NEVER = np.int32(2**31 - 1), 29
 BOTH_BEHIND = np.full(2, BEHIND).view(np.int64)[0]
 
 
@@ -168,12 +168,12 @@ class KdTree(CellTree):
         m, entry = len(count), np.arange(width)
         place = first[:, None] + np.minimum(entry, count[:, None] - 1)
         missing = -(entry >= count[:, None]).astype(np.int64) & BOTH_BEHIND if count[0] < width else None
-        step = np.arange(1, 2 * width + 1, dtype=np.int32)[:, None]
-        whole, columns, last = count.astype(np.int32), np.arange(m), 2 * count - 1
+        balance = np.arange(1, 2 * width + 1, dtype=np.int32)[:, None] - count.astype(np.int32)
+        columns, last = np.arange(m), 2 * count - 1
         # The first place inside, and how many there are.
         low, size = low + 2, high - low
         best, axis, chosen = np.full(m, np.inf), np.zeros(m, np.int64), np.zeros(m, np.int32)
-        ends, (below, cost) = np.empty((2 * width, m), np.int32), np.empty((2, 2 * width, m))
+        ends, (cost, both) = np.empty((2 * width, m), np.int32), np.empty((2, 2 * width, m))
         for a in range(3):
             rows = own[a].take(place)
             if missing is not None:
@@ -181,28 +181,26 @@ class KdTree(CellTree):
             rows = rows.view(np.int32)
             rows.sort(axis=1)
             np.subtract(rows.T, low[:, a], out=ends)
-            left = ends & 1
-            right = _sums(left)
-            np.subtract(right, left, out=left)
-            right -= step
-            right += whole
+            begins = ends & 1
+            left = _sums(begins)
+            left -= begins
+            # Boxes to the left less those to the right: one more with every end.
+            np.subtract(balance, begins, out=begins)
             b, c, d = size[:, (a + 1) % 3] * 1.0, size[:, (a + 2) % 3] * 1.0, size[:, a] * 1.0
             face, rim = b * c, (b + c) * d
             face, rim = face / (face + rim), rim / (face + rim)
+            # Neither in the cell's faces nor beyond.
+            left |= np.left_shift(ends.view(np.uint32) >= (size[:, a] - 2).view(np.uint32), NEVER, dtype=np.int32)
             # Parts of the cell's area, each weighted with its boxes.
             part = rim / d
-            np.multiply(ends, part, out=below)
-            np.add(below, face + 2.0 * part, out=cost)
-            cost *= left
-            np.subtract(1.0 - 2.0 * part, below, out=below)
-            below *= right
-            cost += below
+            np.multiply(ends, part, out=cost)
+            cost -= 1.0 - 2.0 * part
+            cost *= begins
+            np.multiply(left, 1.0 + face, out=both)
+            cost += both
             # On one side of the first beginning, and of the last end, there is nothing.
             cost[0] *= 1.0 - self.empty_bonus
             cost[last, columns] *= 1.0 - self.empty_bonus
-            # Neither in the cell's faces nor beyond.
-            np.multiply(ends.view(np.uint32) >= (size[:, a] - 2).view(np.uint32), NEVER, out=below)
-            cost += below
             least = cost.min(axis=0)
             better = np.flatnonzero(least < best)
             if len(better):
@@ -212,7 +210,7 @@ class KdTree(CellTree):
                 first_end[cheapest % m] = ends.ravel().take(cheapest)
                 chosen[better] = (first_end + low[:, a])[better]
                 best[better], axis[better] = least[better], a
-        return np.where(best < NEVER, best, np.inf), axis, chosen
+        return np.where(best < 2.0 ** (NEVER - 1), best, np.inf), axis, chosen
 
 
 def _sums(rows):

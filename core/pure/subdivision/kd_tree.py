@@ -115,7 +115,7 @@ class KdTree(CellTree):
                 if low < end >> 1 < high:
                     # The parts of the area, each weighted with its boxes.
                     below = (end - 2 * low - 2) * part
-                    cost = (below + (face + 2.0 * part)) * left + ((1.0 - 2.0 * part) - below) * right
+                    cost = (below - (1.0 - 2.0 * part)) * (left - right) + left * (1.0 + face)
                     if left == 0 or right == 0:
                         cost *= 1.0 - self.empty_bonus
                     if cost < best:
