@@ -100,8 +100,7 @@ class Trace:
             raise SceneError("\n".join(str(notice) for notice in self.scene.notices if "camera" in notice.text))
         self.choice, self.options = choice_of(scene) | kinds_of(scene), options_of(scene)
         self.result, self.changed = None, False
-        self.estimate = estimate(self.scene, self.choice["technique"], self.choice["core"], self.size, self.options["samples"],
-                                 self.options["depth"]).check_memory()
+        self.estimate = estimate(self.scene, self.choice["technique"], self.choice["core"], self.size, **self.options).check_memory()
 
     def __call__(self, progress, on_tile=None):
         from ..core.rendering import Rendering

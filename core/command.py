@@ -309,7 +309,7 @@ def trace_verb(call):
     fewer = {name: getattr(call, name) for name in ("threshold", "roulette", "sampling", "antialiasing", "aa_threshold", "aa_level", "light_samples")}
     scene = call.scene(call.size)
     size = call.size or proportional(scene.camera)
-    expected = estimate(scene, "bvh" if name == AUTOMATIC else name, call.core, size, max(call.samples, 1), max(call.depth, 0)).check_memory()
+    expected = estimate(scene, "bvh" if name == AUTOMATIC else name, call.core, size, max(call.samples, 1), max(call.depth, 0), **fewer).check_memory()
     if expected.seconds > LONG_SECONDS:
         say(expected.lines()[0])
     with stoppable() as progress:

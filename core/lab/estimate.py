@@ -22,6 +22,8 @@ MACHINE = 1.5e-3
 class Cost:
     """What a technique costs in one core, in microseconds and bytes.
 
+    Techniques that trace other things than rays go through the whole scene for a picture, however small it is.
+
     Parameters
     ----------
     build : float
@@ -32,6 +34,8 @@ class Cost:
         How the cost of a ray grows with the number of primitives N.
     memory : float
         Bytes a primitive.
+    picture : float
+        Microseconds a primitive, once a picture.
     """
 
     build: float
@@ -39,6 +43,7 @@ class Cost:
     growth: float
     g: object
     memory: float
+    picture: float = 0.0
 
 
 def _linear(n):
@@ -64,6 +69,12 @@ COSTS = {
     ("octree", "pure"): Cost(700.0, 60.0, 6.0, _log, 2000),
     ("kd-tree", "fast"): Cost(80.0, 6.0, 0.8, _cube_root, 2500),
     ("kd-tree", "pure"): Cost(1200.0, 70.0, 10.0, _log, 6000),
+    ("beams", "fast"): Cost(1.0, 5.0, 0.0, _log, 1200, 1500.0),
+    ("beams", "pure"): Cost(20.0, 50.0, 0.0, _log, 2500, 5000.0),
+    ("pyramids", "fast"): Cost(15.0, 5.0, 0.0, _log, 400, 1000.0),
+    ("pyramids", "pure"): Cost(1250.0, 150.0, 5.0, _log, 2500, 1000.0),
+    ("cones", "fast"): Cost(10.0, 3.0, 2.2, _cube_root, 400),
+    ("cones", "pure"): Cost(1250.0, 150.0, 5.0, _log, 2500),
     ("embree", "fast"): Cost(3.0, 1.0, 0.03, _log, 200),
     ("mathutils", "fast"): Cost(2.5, 3.0, 0.1, _log, 900),
 }
@@ -105,7 +116,8 @@ class Estimate:
         return self
 
 
-def estimate(scene, technique="bvh", core="fast", size=None, samples=1, depth=5):
+def estimate(scene, technique="bvh", core="fast", size=None, samples=1, depth=5, antialiasing="uniform", aa_threshold=0.03, aa_level=2,
+             light_samples=1, threshold=0.0, **others):
     """Estimate a build, and with a `size` the picture too.
 
     Parameters
@@ -115,7 +127,10 @@ def estimate(scene, technique="bvh", core="fast", size=None, samples=1, depth=5)
     core : {"fast", "pure"}
     size : tuple of int, optional
         Width and height of the picture; only the build if absent.
-    samples, depth : int
+    samples, depth, antialiasing, aa_threshold, aa_level, light_samples, threshold
+        Of the picture, as of :class:`~rayscope.core.rendering.Rendering`.
+    **others
+        Its other options, which do not change what it takes.
 
     Returns
     -------
@@ -132,18 +147,36 @@ def estimate(scene, technique="bvh", core="fast", size=None, samples=1, depth=5)
     rays, pixels = 0, 0
     if size is not None:
         pixels = size[0] * size[1]
-        rays = int(pixels * samples * (1 + len(scene.lights)) * _generations(scene, depth))
-    seconds = 1e-6 * (stored * cost.build + rays * (cost.ray + cost.growth * cost.g(scene.n_primitives)))
+        taken = _samples(samples, antialiasing, aa_threshold, aa_level) if row.ray_by_ray else 1   # others trace a pixel as a whole
+        to_lights = sum(light_samples if light.has_extent and row.ray_by_ray else 1 for light in scene.lights)
+        rays = int(pixels * taken * (1 + to_lights) * _generations(scene, depth, threshold))
+    seconds = 1e-6 * (stored * cost.build + rays * (cost.ray + cost.growth * cost.g(scene.n_primitives)) + (pixels > 0) * scene.n_primitives * cost.picture)
     if core == "pure":
         seconds *= machine_seconds() / MACHINE
     return Estimate(seconds, stored * cost.memory + pixels * PIXEL, scene.n_primitives, rays)
 
 
-def _generations(scene, depth):
+#: Share of the pixels in which adaptive antialiasing finds something at its usual threshold, about: as on the interior.
+UNEVEN = 0.35
+
+
+def _samples(samples, antialiasing, threshold, level):
+    """Samples a pixel, on average; an adaptive way takes the most that it may where it finds something."""
+    if antialiasing == "uniform":
+        return samples
+    first = 1 if antialiasing == "corners" else max(samples, 4)
+    # A threshold ten times as fine finds three times as much.
+    uneven = min(1.0, UNEVEN * math.sqrt(0.03 / max(threshold, 1e-6)))
+    return first + uneven * max(4**level - first, 0)
+
+
+def _generations(scene, depth, threshold):
     """How many times the primary rays' number is traced: mirrors and glass send rays on from where they are seen."""
     materials = scene.used_materials()
     if not any(m.mirror or m.mirror_base or m.transmission for m in materials):
         return 1.0
+    if threshold > 0.0:                                                     # about a half of the light is sent on each time
+        depth = min(depth, math.log2(1.0 / min(threshold, 1.0)))
     return 1.0 + min(depth, 4) * 0.5
 
 

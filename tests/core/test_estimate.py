@@ -1,12 +1,14 @@
 """Estimates: in the right order of magnitude, in words, and memory that is not there is an error before anything is built."""
 import math
 import time
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from rayscope.core import Camera, MemoryEstimateError, Scene, build, techniques, trace
+from rayscope.core import Camera, Light, Material, MemoryEstimateError, Scene, build, techniques, trace
 from rayscope.core.lab import estimate as lab
+from rayscope.core.lab import needs
 from rayscope.core.lab.estimate import estimate
 
 
@@ -39,6 +41,33 @@ def test_it_grows_with_what_is_asked():
     assert estimate(large, size=(100, 100), samples=8).rays == 8 * one.rays
     assert estimate(large, core="pure", size=(100, 100)).seconds > 5 * one.seconds
     assert estimate(large).rays == 0
+
+
+def test_adaptive_options_count():
+    scene = soup(100)
+    rays = lambda **options: estimate(scene, size=(100, 100), **options).rays                        # noqa: E731
+    assert rays(seed=3, roulette=True) == rays() == 10_000
+    for way in ("corners", "variance"):
+        assert rays() < rays(antialiasing=way) < rays(samples=16) and rays(antialiasing=way) < rays(antialiasing=way, aa_level=4)
+        assert rays(antialiasing=way, aa_threshold=0.01) > rays(antialiasing=way)
+    lit = replace(scene, lights=[Light("lamp", "point", (1, 1, 1), (0, 0, 5), radius=0.5), Light("spark", "point", (1, 1, 1), (5, 0, 5))])
+    assert estimate(lit, size=(100, 100), light_samples=4).rays == 10_000 * (1 + 4 + 1)
+    mirrors = replace(scene, objects=[replace(scene.objects[0], materials=(Material("mirror", mirror=0.9),))])
+    deep, cut = (estimate(mirrors, size=(100, 100), depth=9, threshold=t).rays for t in (0.0, 0.3))
+    assert 10_000 < cut < deep
+    # What traces a pixel as a whole takes one sample whatever is asked.
+    assert estimate(scene, "cones", size=(100, 100), samples=16).rays == 10_000
+
+
+@pytest.mark.parametrize("core", ["fast", "pure"])
+@pytest.mark.parametrize("name", ["beams", "cones", "pyramids"])
+def test_what_traces_other_things_than_rays_is_of_the_right_order(name, core):
+    """Their times differ more from scene to scene."""
+    scene = needs._lit(needs._triangles(500 if core == "fast" else 100))
+    trace(needs._lit(needs._triangles(5)), name, core, size=(4, 4))     # imports
+    start = time.process_time()
+    trace(scene, name, core, size=(32, 24))
+    assert 0.03 < estimate(scene, name, core, (32, 24)).seconds / (time.process_time() - start) < 30
 
 
 def test_instances_are_stored_once():
