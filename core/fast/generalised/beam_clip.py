@@ -52,29 +52,29 @@ def cut(points, count, distance, side):
     """
     n, v, k = points.shape
     live = np.arange(v) < count[:, None]
-    following = np.roll(points, -1, axis=1)
-    ahead, side_ahead = np.roll(distance, -1, axis=1), np.roll(side, -1, axis=1)
-    row, place = np.nonzero(live & (side * side_ahead < 0))
+    after = np.concatenate([np.arange(1, v), [0]])
+    row, place = np.nonzero(live & (side * side[:, after] < 0))
     # From the nearer end: neighbours find the same point, and the other may be very far away.
-    a, b, d0, d1 = points[row, place], following[row, place], distance[row, place], ahead[row, place]
-    turned = np.abs(d0) > np.abs(d1)
-    a[turned], b[turned], d0[turned], d1[turned] = b[turned], a[turned], d1[turned], d0[turned]
-    new = a + (d0 / (d0 - d1))[:, None] * (b - a)
-    crossing = np.zeros((n, v), np.int64)
+    first, second = row * v + place, row * v + after[place]
+    flat, corners = distance.ravel(), points.reshape(-1, k)
+    turned = np.abs(flat[first]) > np.abs(flat[second])
+    near, far = np.where(turned, second, first), np.where(turned, first, second)
+    d0, a = flat[near], corners[near]
+    new = a + (d0 / (d0 - flat[far]))[:, None] * (corners[far] - a)
+    crossing = np.zeros((n, v), np.int8)
     crossing[row, place] = 1
     parts = []
     for keep in (live & (side >= 0), live & (side <= 0)):
-        ends = np.cumsum(keep + crossing, axis=1)
-        at = ends - keep - crossing
+        ends = np.cumsum(keep + crossing, axis=1, dtype=np.int64)
         total = ends[:, -1]
-        out = np.empty((n, int(total.max(initial=1)), k))
+        width = int(total.max(initial=1))
+        # Where each corner of the parts comes from: at first from the old ones, then from the new; what is spare, as the first.
+        source = np.zeros((n, width), np.int64)
         mine, own = np.nonzero(keep)
-        out[mine, at[mine, own]] = points[mine, own]
-        out[row, at[row, place] + keep[row, place]] = new
-        spare = np.arange(out.shape[1]) >= total[:, None]
-        mine, own = np.nonzero(spare)
-        out[mine, own] = out[mine, 0]
-        parts.append((out, total))
+        source[mine, ends[mine, own] - crossing[mine, own] - 1] = mine * v + own
+        source[row, ends[row, place] - 1] = n * v + np.arange(len(row))
+        source = np.where(np.arange(width) < total[:, None], source, source[:, :1])
+        parts.append((np.concatenate([corners, new])[source], total))
     return parts
 
 

@@ -345,7 +345,7 @@ class BeamTree:
             points, count = faces.points[fragment], faces.count[fragment]
             d = distances(line, points)
             some = np.flatnonzero(seen & ~(d.max(axis=2, initial=-np.inf) <= TOLERANCE).any(axis=1))
-            points, count, _, _ = carved(points[some], count[some], line[some])
+            points, count, _, _ = carved(points[some], count[some], line[some], d[some])
             there = np.flatnonzero(count > 0)
             light = self.beams.light[self.lit.beam[b[some[there]]]]
             found.append((fragment[some[there]], light, points[there], count[there]))

@@ -209,7 +209,7 @@ class Walk:
         self._keep(own, surface[inside], self.points[own], self.count[own])
         stay[own] = False
         piece, line, surface = piece[~whole], line[~whole], surface[~whole]
-        points, count, rest, owner = carved(self.points[piece], self.count[piece], line)
+        points, count, rest, owner = carved(self.points[piece], self.count[piece], line, d[at[~whole]])
         some = np.flatnonzero(count > 0)
         self._keep(piece[some], surface[some], points[some], count[some])
         stay[piece[some]] = False
@@ -293,7 +293,7 @@ def _apart(points, h):
     return ((value <= TOLERANCE * np.abs(w)).all(axis=2) & (size > 0.0)).any(axis=1)
 
 
-def carved(points, count, line):
+def carved(points, count, line, distance):
     """Cut what is inside of all lines out of convex polygons.
 
     Parameters
@@ -301,6 +301,8 @@ def carved(points, count, line):
     points, count
         n polygons.
     line : ndarray, shape (n, l, 3)
+    distance : ndarray, shape (n, l, v)
+        Of the corners from the lines.
 
     Returns
     -------
@@ -310,22 +312,28 @@ def carved(points, count, line):
         What is outside, in convex parts, and of which polygon each is.
     """
     left, owner = [(np.zeros((0, 3, 2)), np.zeros(0, np.int64))], [np.zeros(0, np.int64)]
-    count = count.copy()
-    for k in range(line.shape[1]):
-        d = distances(line[:, k : k + 1], points)[:, 0]
+    points, count = points.copy(), count.copy()
+    # What a line leaves whole it leaves whole in parts.
+    cuts = (distance < -TOLERANCE).any(axis=2)
+    for k in np.flatnonzero(cuts.any(axis=0)):
+        rows = np.flatnonzero(cuts[:, k] & (count > 0))
+        corners = points[rows]
+        a, b, c = line[rows, k].T[..., None]
+        d = a * corners[..., 0] + b * corners[..., 1] + c
         side = sides(d, TOLERANCE)
         above, below = (side > 0).any(axis=1), (side < 0).any(axis=1)
-        out = np.flatnonzero(~above & below & (count > 0))
+        out = np.flatnonzero(~above & below)
         if len(out):
-            left.append((points[out], count[out]))
-            owner.append(out)
-            count[out] = 0
-        both = np.flatnonzero(above & below & (count > 0))
+            left.append((corners[out], count[rows[out]]))
+            owner.append(rows[out])
+            count[rows[out]] = 0
+        both = np.flatnonzero(above & below)
         if len(both):
-            inside, outside = cut(points[both], count[both], d[both], side[both])
+            own = rows[both]
+            inside, outside = cut(corners[both], count[own], d[both], side[both])
             left.append(outside)
-            owner.append(both)
-            points = widened(points, inside[0].shape[1]).copy()
-            points[both] = widened(inside[0], points.shape[1])
-            count[both] = inside[1]
+            owner.append(own)
+            points = widened(points, inside[0].shape[1])
+            points[own] = widened(inside[0], points.shape[1])
+            count[own] = inside[1]
     return points, count, joined(left), np.concatenate(owner)

@@ -170,7 +170,13 @@ def subtract(corners, count, owner, lines, sliver=SLIVER):
     corners, count, owner : ndarray
         The parts left, convex again.
     """
-    left = []
+    apart = np.zeros(len(corners), bool)
+    for k in range(lines.shape[1]):
+        apart |= lines[:, k].any(axis=1) & (sides(corners, lines[:, k]) <= 0.0).all(axis=1)
+    # What lies beyond a line is left whole, or the lines before it would cut it for nothing.
+    whole, rest = np.flatnonzero(apart), np.flatnonzero(~apart)
+    left = [(corners[whole], count[whole], owner[whole])]
+    corners, count, owner, lines = corners[rest], count[rest], owner[rest], lines[rest]
     for k in range(lines.shape[1]):
         line = lines[:, k]
         real = line.any(axis=1)

@@ -64,7 +64,7 @@ class ConeTracer(FootprintTracer):
         What hides what is judged at points of the aperture, as in the A-buffer (Carpenter 1984).
         """
         share, s, t = outlines.share.copy(), outlines.s.copy(), outlines.t.copy()
-        beaten = self._beaten(outlines)
+        beaten = outlines.beaten()
         share[beaten] = 0.0
         left = np.flatnonzero(~beaten)
         rows, start, group = _groups(outlines.cone[left])
@@ -104,19 +104,6 @@ class ConeTracer(FootprintTracer):
         s[rows[hidden]] = (credit[hidden] @ ps) / won[hidden]
         t[rows[hidden]] = (credit[hidden] @ pt) / won[hidden]
         return share, s, t
-
-    @staticmethod
-    def _beaten(outlines):
-        """Which pieces lie all behind another that covers the whole cone."""
-        near = outlines.nearness()
-        reach = np.hypot(near[0], near[1]) if outlines.cones.disc else np.abs(near[0]) + np.abs(near[1])
-        cone, full = outlines.cone[outlines.flat], outlines.share[outlines.flat] == 1.0
-        least = np.full(len(outlines.cones), -np.inf)
-        np.maximum.at(least, cone[full], (near[2] - reach)[full])
-        out = np.zeros(len(outlines), bool)
-        # Beyond rounding.
-        out[outlines.flat] = near[2] + reach < least[cone] - 1e-9 * np.abs(least[cone])
-        return out
 
     def _fewer(self, share, group, wave):
         """Shares of pieces where of those that weigh little only some are left: systematic sampling.

@@ -213,6 +213,23 @@ class Outlines:
         with np.errstate(divide="ignore", invalid="ignore"):
             return np.where(parallel, [nx / nw, ny / nw, -total / nw], [nx / total, ny / total, nw / total])
 
+    def reach(self):
+        """Least and greatest nearness (see :meth:`nearness`) of triangles' planes over the aperture, shape (triangles,)."""
+        a, b, middle = self.nearness()
+        reach = np.hypot(a, b) if self.cones.disc else np.abs(a) + np.abs(b)
+        return middle - reach, middle + reach
+
+    def beaten(self):
+        """Which pieces lie all behind another that covers the whole cone."""
+        near, far = self.reach()
+        cone, full = self.cone[self.flat], self.share[self.flat] == 1.0
+        least = np.full(len(self.cones), -np.inf)
+        np.maximum.at(least, cone[full], near[full])
+        out = np.zeros(len(self), bool)
+        # Beyond rounding.
+        out[self.flat] = far < least[cone] - 1e-9 * np.abs(least[cone])
+        return out
+
     def distances(self, s, t):
         """w at points of the aperture, shape (m, k); inf where a piece does not cover the point.
 

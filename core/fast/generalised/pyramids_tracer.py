@@ -26,34 +26,46 @@ class PyramidTracer(FootprintTracer):
 
     def visible(self, outlines, wave):
         """See :class:`FootprintTracer`."""
+        all_, left = len(outlines), np.flatnonzero(~outlines.beaten())
+        outlines = outlines.take(left)
         corners, count = within_lines(outlines.lines)
         first = np.flatnonzero(np.diff(outlines.cone, prepend=-1))
         size = np.diff(first, append=len(outlines))
         begin, number = np.repeat(first, size), np.repeat(size, size)
         planes = outlines.nearness().T
+        # What is large hides most: taken away first, it leaves least to be cut by what is small.
+        order = np.lexsort((-outlines.share, outlines.cone))
         owner = np.arange(len(outlines))
         least, most = corners.min(axis=1), corners.max(axis=1)
-        for j in range(int(size.max(initial=1)) if (size > 1).any() else 0):
+        done = []
+        for j in range(int(size.max(initial=0))):
             self.check()                                    # pieces grow as the square of what is in a pixel
-            other = begin[owner] + j
-            there = (j < number[owner]) & (other != owner)
-            other = np.where(there, other, 0)
+            there = (count >= 3) & (j < number[owner])
+            if not there.all():
+                some = np.flatnonzero(there)
+                rest = np.flatnonzero(~there)
+                done.append((corners[rest], count[rest], owner[rest]))
+                corners, count, owner = corners[some], count[some], owner[some]
+            other = order[begin[owner] + j]
             line = planes[other] - planes[owner]
             same = ~line.any(axis=1)
             # Of two at the same place the first is seen; what lies behind all over the pixel hides nothing.
             reach = np.abs(line[:, 0]) + np.abs(line[:, 1])
-            hides = there & np.where(same, other < owner, line[:, 2] > -reach)
-            overlap = (least[other] < most[owner]) & (most[other] > least[owner])
-            hides &= overlap.all(axis=1) & (count >= 3)
-            some, rest = np.flatnonzero(hides), np.flatnonzero(~hides & (count >= 3))
+            hides = (other != owner) & np.where(same, other < owner, line[:, 2] > -reach)
+            hides &= ((least[other] < corners.max(axis=1)) & (most[other] > corners.min(axis=1))).all(axis=1)
+            some = np.flatnonzero(hides)
             if not len(some):
                 continue
+            rest = np.flatnonzero(~hides)
             lines = np.concatenate([outlines.lines[:, :, other[some]].transpose(2, 0, 1), line[some][:, None]], axis=1)
             parts = clipping.subtract(corners[some], count[some], owner[some], lines)
             corners, count, owner = clipping.padded([(corners[rest], count[rest], owner[rest]), parts])
+        corners, count, owner = clipping.padded([*done, (corners, count, owner)])
         area, moment = clipping.moments(corners)
+        share, s, t = np.zeros((3, all_))
         n = len(outlines)
         total = np.bincount(owner, area, minlength=n)
+        share[left] = np.clip(total / 4.0, 0.0, 1.0)
         with np.errstate(divide="ignore", invalid="ignore"):
-            s, t = (np.where(total > 0.0, np.bincount(owner, m, minlength=n) / total, 0.0) for m in moment.T)
-        return np.clip(total / 4.0, 0.0, 1.0), s, t
+            s[left], t[left] = (np.where(total > 0.0, np.bincount(owner, m, minlength=n) / total, 0.0) for m in moment.T)
+        return share, s, t

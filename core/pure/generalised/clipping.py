@@ -137,10 +137,12 @@ def subtract(polygon, lines, sliver=SLIVER):
     list of polygons
         The parts left, convex again.
     """
+    lines = [line for line in lines if any(line)]
+    # What lies beyond a line is left whole, or the lines before it would cut it for nothing.
+    if any(all(side(p, line) <= 0.0 for p in polygon) for line in lines):
+        return [polygon]
     left = []
     for line in lines:
-        if not any(line):
-            continue
         polygon, outside = split(polygon, line)
         if len(outside) >= 3 and area(outside) > sliver:
             left.append(outside)
