@@ -87,19 +87,11 @@ class Contest:
         columns = {f.name: [getattr(a, f.name) for a in answers] for f in fields(Hits)}
         return Hits(**{name: None if some[0] is None else np.concatenate(some)[order] for name, some in columns.items()})
 
-    def occluded(self, *arguments, **more):
+    def occluded(self, origins, directions, t_min=0.0, t_max=np.inf, count=False, progress=None, leaving=None, through=None, light=None):
         """As of a structure."""
-        return self._blocked("occluded", *arguments, **more)
-
-    def blockers(self, *arguments, **more):
-        """As of a structure."""
-        return self._blocked("blockers", *arguments, **more)
-
-    def _blocked(self, question, origins, directions, t_min=0.0, t_max=np.inf, count=False, progress=None, leaving=None, light=None):
-        """What a question about anything in the way is answered."""
         def ask(structure, which):
-            answer = getattr(structure, question)(origins[which], directions[which], _part(t_min, which), _part(t_max, which), count, progress,
-                                                  _left(structure, leaving, which))
+            answer = structure.occluded(origins[which], directions[which], _part(t_min, which), _part(t_max, which), count, progress,
+                                        _left(structure, leaving, which), through)
             return answer if count else (answer, {})
 
         answers, order = self._put(len(origins), ask, light)
@@ -181,10 +173,6 @@ class OneLight:
     def occluded(self, *arguments, **more):
         """As of a structure."""
         return self.contest.occluded(*arguments, **more, light=self.light)
-
-    def blockers(self, *arguments, **more):
-        """As of a structure."""
-        return self.contest.blockers(*arguments, **more, light=self.light)
 
 
 def _part(value, which):

@@ -55,7 +55,9 @@ class Tracer:
         materials = scene.used_materials()
         self.bounces = self.depth > 0 and any(m.reflects for m in materials)
         self.transparent = any(m.transparent for m in materials)
-        self.coloured_shadows = self.transparent or any(m.refracts for m in materials)
+        #: For each object whether some of it lets light through.
+        self.lets_light = [any(m.transparent or m.refracts for m in o.materials) for o in scene.objects]
+        self.coloured_shadows = any(self.lets_light)
         lights, n = [light for light in scene.lights if any(light.colour)], options["light_samples"]
         #: A light that is sampled n times is there n times, by 1 / n.
         self.lights = [(light, 1.0 / k) for light in lights for k in (n if light.has_extent else 1,) for _ in range(k)]

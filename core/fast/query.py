@@ -49,12 +49,19 @@ class Closest:
     counts : Counts or None
     """
 
+    #: What it finds out, an array each.
+    ANSWER = ("t", "item", "u", "v", "detail")
+
     def __init__(self, primitives, rays, counts=None):
         self.primitives, self.rays, self.counts = primitives, rays, counts
         self.t = rays.t_max.copy()
         self.item = np.full(rays.n, -1, np.int64)
         self.u, self.v = np.zeros(rays.n), np.zeros(rays.n)
         self.detail = np.zeros(rays.n, np.int64)
+
+    def again(self, rays, counts):
+        """The same question about other rays."""
+        return Closest(self.primitives, rays, counts)
 
     def test(self, ray, item):
         """Test pairs of rays and primitives (numbers in the batch, numbers in the set); keep the nearest hits.
@@ -102,22 +109,41 @@ class Occluded:
     t : ndarray, shape (n,)
         t_max, or minus infinity once the ray is known to be blocked.
     blocked : ndarray, shape (n,), bool
+    through : ndarray of bool, or None
+        For each of the scene's objects whether it lets light through, so that it does not block.
+    met : ndarray, shape (n,), bool
+        Of rays that are not blocked: whether such an object is met.
     """
 
-    def __init__(self, primitives, rays, counts=None):
-        self.primitives, self.rays, self.counts = primitives, rays, counts
+    #: What it finds out, an array each.
+    ANSWER = ("t", "blocked", "met")
+
+    def __init__(self, primitives, rays, counts=None, through=None):
+        self.primitives, self.rays, self.counts, self.through = primitives, rays, counts, through
         self.t = rays.t_max.copy()
-        self.blocked = np.zeros(rays.n, bool)
+        self.blocked, self.met = np.zeros((2, rays.n), bool)
+
+    def again(self, rays, counts):
+        """The same question about other rays."""
+        return Occluded(self.primitives, rays, counts, self.through)
+
+    def passes(self, item):
+        """Bool per primitive: whether it lets light through."""
+        return np.zeros(len(item), bool) if self.through is None else self.through.take(self.primitives.object_of(item))
 
     def test(self, ray, item):
         """Test pairs of rays and primitives; returns those that hit."""
         if self.counts:
             self.counts.tests(ray)
         pair = self.primitives.blocks(self.rays, ray, item, self.t, self.counts)
-        self.keep(ray.take(pair))
+        self.keep(ray.take(pair), item.take(pair))
         return pair
 
-    def keep(self, ray, *_):
-        """These rays are blocked."""
+    def keep(self, ray, item, *_):
+        """These rays are blocked by these primitives, unless they let light through."""
+        if self.through is not None:
+            passes = self.passes(item)
+            self.met[ray[passes]] = True
+            ray = ray[~passes]
         self.blocked[ray] = True
         self.t[ray] = -np.inf

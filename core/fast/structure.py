@@ -2,6 +2,7 @@
 
 import math
 from copy import copy
+from functools import partial
 
 import numpy as np
 
@@ -130,7 +131,7 @@ class Structure:
                     hits.normal[:, axis][at], hits.point[:, axis][at] = normal[:, axis], point[:, axis]
         return hits
 
-    def occluded(self, origins, directions, t_min=0.0, t_max=math.inf, count=False, progress=None, leaving=None):
+    def occluded(self, origins, directions, t_min=0.0, t_max=math.inf, count=False, progress=None, leaving=None, through=None):
         """Whether anything lies at t_min <= t <= t_max.
 
         Parameters
@@ -139,16 +140,23 @@ class Structure:
             As for :meth:`closest`.
         count : bool
             Also return the counts.
+        through : sequence of bool, optional
+            For each of the scene's objects whether it lets light through, so that it does not block.
 
         Returns
         -------
         ndarray of bool, shape (n,), or (ndarray, dict of ndarray) with the counts n_it, n_ts, n_ets, n_eets
+            With `through` not bool but 1 for what is blocked, 2 where only something that lets light through is met, 0 where
+            nothing is.
         """
-        parts, counts = self._ask(Occluded, origins, directions, t_min, t_max, count, progress, leaving)
-        blocked = np.zeros(len(origins), bool)
+        question = Occluded if through is None else partial(Occluded, through=np.asarray(through, bool))
+        parts, counts = self._ask(question, origins, directions, t_min, t_max, count, progress, leaving)
+        state = np.zeros(len(origins), bool if through is None else np.uint8)
         for number, query in parts:
-            blocked[number[query.blocked]] = True
-        return (blocked, counts) if count else blocked
+            if through is not None:
+                state[number[query.met]] = 2
+            state[number[query.blocked]] = 1
+        return (state, counts) if count else state
 
     def _ask(self, question, origins, directions, t_min, t_max, count, progress, leaving):
         """Put a question to all rays, batch by batch; pairs (numbers of rays, their query), and the counts of all."""

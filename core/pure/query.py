@@ -56,13 +56,17 @@ class Occluded:
     t : float
         t_max, or minus infinity once the ray is known to be blocked.
     blocked : bool
+    through : sequence of bool, or None
+        For each of the scene's objects whether it lets light through, so that it does not block.
+    met : bool
+        Where it is not blocked: whether such an object is met.
     """
 
-    __slots__ = ("primitives", "ray", "watch", "t", "blocked")
+    __slots__ = ("primitives", "ray", "watch", "t", "blocked", "through", "met")
 
-    def __init__(self, primitives, ray, watch=None):
-        self.primitives, self.ray, self.watch = primitives, ray, watch
-        self.t, self.blocked = ray.t_max, False
+    def __init__(self, primitives, ray, watch=None, through=None):
+        self.primitives, self.ray, self.watch, self.through = primitives, ray, watch, through
+        self.t, self.blocked, self.met = ray.t_max, False, False
 
     def test(self, item):
         """Test one primitive."""
@@ -71,4 +75,11 @@ class Occluded:
         if self.primitives[item].blocks(self.ray, self.t, self.watch):
             if self.watch:
                 self.watch.hit(item, self.t)
-            self.t, self.blocked = -math.inf, True
+            if self.passes(item):
+                self.met = True
+            else:
+                self.t, self.blocked = -math.inf, True
+
+    def passes(self, item):
+        """Whether a primitive lets light through."""
+        return self.through is not None and self.through[self.primitives[item].object]

@@ -101,9 +101,9 @@ class Structure:
         """
         return Cells.make([], [], [], [], [], [])
 
-    def ask(self, question, ray, watch=None):
+    def ask(self, question, ray, watch=None, **more):
         """Put a question (:class:`Closest` or :class:`Occluded`) about a usable ray; the query that knows the answer."""
-        query = question(self.primitives, ray, watch)
+        query = question(self.primitives, ray, watch, **more)
         if self.primitives:
             self.walk(query)
         return query
@@ -139,6 +139,16 @@ class Structure:
         if watch:
             watch.begin(ray)
         return self.ask(Occluded, ray, watch).blocked
+
+    def shadowed_ray(self, ray, through, watch=None):
+        """Two of bool: whether a ray is blocked by something that lets no light through; and if it is not, whether something
+        that does is met. `through` says of each of the scene's objects whether it does."""
+        if not ray.usable:
+            return False, False
+        if watch:
+            watch.begin(ray)
+        query = self.ask(Occluded, ray, watch, through=through)
+        return query.blocked, query.met
 
     def closest(self, origins, directions, t_min=0.0, t_max=math.inf, count=False, progress=None, leaving=None):
         """The nearest hit of every ray with t_min <= t <= t_max.

@@ -87,7 +87,8 @@ class Listed:
         refused = np.flatnonzero(self.covered.take(cell) >= 0) if self.cuts else np.zeros(0, np.int64)
         if len(refused) and isinstance(query, Occluded) and end is not None:
             first = self.feet.nearest.take(self.entry.take(self.start.take(cell.take(refused))))
-            refused = refused[~(end.take(refused) >= first)]
+            passes = query.passes(self.feet.item.take(self.covered.take(cell.take(refused))))
+            refused = refused[~(end.take(refused) >= first) | passes]
         if len(refused):
             tested = np.ones(len(cell), bool)
             tested[refused] = False

@@ -2,7 +2,7 @@
 
 from ...handing import HandingOver
 from ..primitives import Primitives
-from ..query import Closest, Counts
+from ..query import Counts
 from ..structure import Structure
 
 
@@ -25,13 +25,9 @@ class Handing(HandingOver, Structure):
         if which is None:
             self.second.traverse(rays, query)
             return
-        part = type(query)(query.primitives, rays.take(which), Counts(len(which)) if query.counts else None)
+        part = query.again(rays.take(which), Counts(len(which)) if query.counts else None)
         self.second.traverse(part.rays, part)
-        query.t[which] = part.t
-        if isinstance(query, Closest):
-            for name in ("item", "u", "v", "detail"):
-                getattr(query, name)[which] = getattr(part, name)
-        else:
-            query.blocked[which] = part.blocked
+        for name in query.ANSWER:
+            getattr(query, name)[which] = getattr(part, name)
         if query.counts:
             query.counts.add(which, part.counts)

@@ -11,6 +11,8 @@ A kind is one file with one class. Its objects hold n primitives of the kind as 
     (pair, t, u, v, detail), one entry for each pair that hits; `pair` indexes the pairs.
 ``surface(rays, ray, item, t, u, v, detail)``
     What is there, for one hit of each of some rays: object, primitive, part, normal, point, error, as in :class:`~rayscope.core.hits.Hits`.
+``object_of``
+    The object in the scene that each belongs to, shape (n,).
 ``overlaps(item, lo, hi)``
     Bool per pair: whether the primitive reaches into the box; conservative: touching counts.
 ``clip(item, lo, hi)``
@@ -110,6 +112,13 @@ class Primitives:
                 pair = kind.intersect(rays, ray[at], own, t_far)[0]
             pairs.append(pair if isinstance(at, slice) else at[pair])
         return np.concatenate(pairs)
+
+    def object_of(self, item):
+        """The objects that primitives belong to."""
+        objects = np.empty(len(item), np.int32)
+        for kind, at, own in self._by_kind(item):
+            objects[at] = kind.object_of[own]
+        return objects
 
     def surface(self, rays, ray, item, t, u, v, detail):
         """What is at the hits: object, primitive, part, normal, point, error."""

@@ -47,8 +47,8 @@ class Probe:
         joined = {f.name: [getattr(p, f.name) for p in parts] for f in fields(Hits)}
         return Hits(**{name: None if values[0] is None else np.concatenate(values) for name, values in joined.items()})
 
-    def occluded(self, o, d, t_max, leaving=None):
-        """Bool per ray, and the counts."""
+    def occluded(self, o, d, t_max, leaving=None, through=None):
+        """What a structure says of rays given as columns, and the counts."""
 
         def ask(s):
             answer = self.structure.occluded(
@@ -57,6 +57,7 @@ class Probe:
                 t_max=_part(t_max, s),
                 count=self.count,
                 progress=self._progress,
+                through=through,
                 **self._left(leaving, s),
             )
             return answer if self.count else (answer, {})

@@ -279,23 +279,28 @@ class Whitted(Tracer):
 
     def _through(self, probe, o, d, reach, leaving, pixel):
         """Share of light that comes through along shadow rays, shape (n,) or (3, n)."""
-        if not self.coloured_shadows:
-            blocked, counts = probe.occluded(o, d, reach, leaving)
-            self._count(SHADOW, pixel, np.count_nonzero(blocked), counts)
-            return 1.0 - blocked
+        state, counts = probe.occluded(o, d, reach, leaving, self.lets_light if self.coloured_shadows else None)
+        self._count(SHADOW, pixel, np.count_nonzero(state), counts)
+        share = 1.0 - (state == 1)
+        # What is between comes into it, one after the other, only where nothing opaque is.
+        some = np.flatnonzero(state == 2) if self.coloured_shadows else ()
+        if not len(some):
+            return share
         from .shadows import filtered
 
         def closest(which, o, d, t_max, leaving):
             hits = probe.closest(o, d, 0.0, t_max, leaving)
             self._count(
                 SHADOW,
-                pixel[which],
+                pixel[some[which]],
                 np.count_nonzero(hits.primitive >= 0),
                 {name: getattr(hits, name) for name in COUNTED} if self.count else {},
             )
             return hits
 
-        return filtered(closest, self.surfaces, o, d, reach, leaving)
+        colour = np.tile(share, (3, 1))
+        colour[:, some] = filtered(closest, self.surfaces, o[:, some], d[:, some], reach[some], leaving[:, some])
+        return colour
 
     def _towards(self, light):
         """Who is asked about shadow rays to a light."""

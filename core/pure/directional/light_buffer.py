@@ -72,7 +72,7 @@ class LightBuffer(Handing):
         cell, nearness, blocked_from = buffer.cell(place, query.ray)
         if buffer.parts != parts:
             self._make_room(number)
-        if cell.covered >= 0 and (not isinstance(query, Occluded) or blocked_from < cell.entries[0][0]):
+        if cell.covered >= 0 and (not isinstance(query, Occluded) or blocked_from < cell.entries[0][0] or query.passes(cell.covered)):
             # What lies behind the full occluder is not listed, but may count.
             return False
         if query.watch:

@@ -195,9 +195,13 @@ class Whitted(Tracer):
             blocked, counter = self._towards(light).occluded(o, d, reach, surface.place)
             self._count(SHADOW, blocked, counter)
             return (0.0, 0.0, 0.0) if blocked else (1.0, 1.0, 1.0)
-        from .shadows import filtered
-
         probe = self._towards(light)
+        (blocked, met), counter = probe.shadowed(o, d, reach, surface.place, self.lets_light)
+        self._count(SHADOW, blocked or met, counter)
+        if blocked or not met:
+            return (0.0, 0.0, 0.0) if blocked else (1.0, 1.0, 1.0)
+        # What is between comes into it, one after the other, only where nothing opaque is.
+        from .shadows import filtered
 
         def closest(o, d, t_max, leaving):
             return self._closest(SHADOW, o, d, 0.0, t_max, leaving, probe)
