@@ -23,7 +23,6 @@ from ..catalogue import build, technique, techniques
 from ..cells import cells_along
 from ..errors import Cancelled, RayscopeError
 from ..options import AUTOMATIC, STANDARD
-from ..parameters import resolve
 from ..scene.camera import Camera
 from ..scene.light import Light
 from ..scene.scene import Scene
@@ -91,7 +90,7 @@ class Measures:
     nodes : float
         Boxes and primitives of the bvh: its c_SAH, and the levels down to the one that it ends on.
     cells : float
-        Cells of a grid at its own density.
+        Cells of a grid of CELLS_EACH a primitive, whatever the grid has that is built: counts follow them.
     listed : float
         Primitives listed in these cells: boxes of primitives, grown by a cell, that it meets, and what else is in the
         cells of those that it ends on (`crowd`).
@@ -113,6 +112,8 @@ class Measures:
                         self.cells + self.listed * inner.cells, self.listed * (1.0 + inner.listed), max(self.crowd, inner.crowd))
 
 
+#: Cells a primitive in the grid whose cells and lists are measured.
+CELLS_EACH = 4.0
 #: Those that counts may follow.
 FOLLOWED = ("one", "all", "pierced", "nodes", "cells", "listed")
 
@@ -215,7 +216,7 @@ def _measured_boxes(index):
     scale = float(size.max()) or 1.0
     lo, edge = (lo[some] - first) / scale, (hi[some] - lo[some]) / scale
     size = size / scale
-    resolution = np.array(cells_along(size.tolist(), n, **_grid_rule()))
+    resolution = np.array(cells_along(size.tolist(), n, "woo", CELLS_EACH, 0))
     width = size / resolution
     weight = n / len(lo)
     box = _half_area(size)
@@ -243,13 +244,6 @@ def _half_area(edges):
     """Half the surface of boxes with these edges, given as three columns."""
     x, y, z = edges
     return x * y + y * z + z * x
-
-
-@functools.cache
-def _grid_rule():
-    """How many cells a grid has, as :func:`cells_along` wants to know it."""
-    values = resolve("grid", technique("grid").parameters, {}, "fast")
-    return {name: values[name] for name in ("rule", "density", "resolution")}
 
 
 def _mean(some):
