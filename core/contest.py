@@ -8,7 +8,7 @@ import numpy as np
 from .hits import Hits
 
 #: Seconds that rays have taken before the first trial: before, one costs more than it can bring.
-START = 0.15
+START = 0.5
 #: The next trial comes when they have taken so many times as long.
 GROWTH = 4
 #: A structure is built when rays have taken so many times as long as that will take: whatever comes of it, little is lost.
@@ -116,15 +116,15 @@ class Contest:
     def _trial(self, n, ask, light):
         """Ask all some of n rays: the numbers of these, the answers, and how many they are."""
         pays = [build for build, seconds in self.others if REPAID * seconds <= self.seconds]
+        k = len(self.structures) + len(pays)
+        heats = HEATS[0], min(HEATS[1], n // (2 * k))
+        if k < 2 or heats[1] < 2 * heats[0]:
+            return [], [], 0
         self.others = [other for other in self.others if other[0] not in pays]
         for build in pays:
             self.structures.append(build())
             self.batch.append(0.0)
             self.ray.append(0.0)
-        k = len(self.structures)
-        heats = HEATS[0], min(HEATS[1], n // (2 * k))
-        if k < 2 or heats[1] < 2 * heats[0]:
-            return [], [], 0
         self._due = max(GROWTH * self.seconds, START)
         parts, answers, done, took, field = [], [], 0, [[] for _ in range(k)], range(k)
         for rays in heats:

@@ -134,7 +134,7 @@ def lists(scene, rays):
 
 def separated(scene, rays):
     """The surplus of separated lists, and their bytes, against the grid's."""
-    plain = build(scene, "grid", walk="add")
+    plain = build(scene, "grid", walk="add", density=4.0)
     tests = plain.closest(rays.origins, rays.directions, count=True).n_it.mean()
     rows = []
     for axes in (3, 2):

@@ -15,7 +15,9 @@ import math
 import time
 from collections import Counter
 from dataclasses import dataclass, field
+from importlib.machinery import SourceFileLoader
 from pathlib import Path
+from statistics import median
 
 import numpy as np
 
@@ -23,11 +25,11 @@ from ..catalogue import build, technique, techniques
 from ..cells import cells_along
 from ..errors import Cancelled, RayscopeError
 from ..options import AUTOMATIC, STANDARD
-from ..parameters import resolve
 from ..scene.camera import Camera
 from ..scene.light import Light
 from ..scene.scene import Scene
 from . import report
+from .estimate import estimate
 from .rays import ray_sets
 
 KINDS = ("primary", "secondary", "shadow")
@@ -50,17 +52,19 @@ TESTS = 90_000
 #: A technique whose time per ray is wrong by more than this factor on the scenes that it was fitted on is no candidate:
 #: its time does not follow from its counters.
 TRUST = 3.0
+#: What is fitted on few rays is right to this factor, about.
+ROUGH = 3.0
 #: Seconds of processor time after which no further technique is calibrated; those left are no candidates.
 BUDGET = 0.7
 #: The whole picture must be faster than with the standard technique by this part, as the model is not exact.
-MARGIN = 0.15
+MARGIN = 0.1
 #: What the model has no more than DOUBT times as slow as the choice may be tried while the picture is traced: so many OTHERS
 #: for a kind of ray, at most.
 DOUBT, OTHERS = 8.0, 3
-#: Techniques that take this many times as long as the best at half the size are not compared at the full one.
-HOPELESS = 2.0
+#: Techniques that take so many times as long as the best at half the size are not compared at the full one.
+HOPELESS = 1.7
 #: Pictures are repeated to compare them until all took so long together; if they take LONG, twice only. Seconds.
-QUICK, LONG = 6.0, 60.0
+QUICK, LONG = 5.0, 30.0
 #: What the automatic choice may take more than the best fixed one, and than STANDARD.
 BARS = (0.15, 0.1)
 #: Databases of :func:`benchmark`, with size factors that give some hundred primitives.
@@ -91,7 +95,7 @@ class Measures:
     nodes : float
         Boxes and primitives of the bvh: its c_SAH, and the levels down to the one that it ends on.
     cells : float
-        Cells of a grid at its own density.
+        Cells of a grid of CELLS_EACH a primitive, whatever the grid has that is built: counts follow them.
     listed : float
         Primitives listed in these cells: boxes of primitives, grown by a cell, that it meets, and what else is in the
         cells of those that it ends on (`crowd`).
@@ -113,6 +117,8 @@ class Measures:
                         self.cells + self.listed * inner.cells, self.listed * (1.0 + inner.listed), max(self.crowd, inner.crowd))
 
 
+#: Cells a primitive in the grid whose cells and lists are measured.
+CELLS_EACH = 4.0
 #: Those that counts may follow.
 FOLLOWED = ("one", "all", "pierced", "nodes", "cells", "listed")
 
@@ -215,7 +221,7 @@ def _measured_boxes(index):
     scale = float(size.max()) or 1.0
     lo, edge = (lo[some] - first) / scale, (hi[some] - lo[some]) / scale
     size = size / scale
-    resolution = np.array(cells_along(size.tolist(), n, **_grid_rule()))
+    resolution = np.array(cells_along(size.tolist(), n, "woo", CELLS_EACH, 0))
     width = size / resolution
     weight = n / len(lo)
     box = _half_area(size)
@@ -243,13 +249,6 @@ def _half_area(edges):
     """Half the surface of boxes with these edges, given as three columns."""
     x, y, z = edges
     return x * y + y * z + z * x
-
-
-@functools.cache
-def _grid_rule():
-    """How many cells a grid has, as :func:`cells_along` wants to know it."""
-    values = resolve("grid", technique("grid").parameters, {}, "fast")
-    return {name: values[name] for name in ("rule", "density", "resolution")}
 
 
 def _mean(some):
@@ -319,13 +318,8 @@ def calibration(core="fast"):
     """
     if core not in _known:
         began, models, spent = time.perf_counter(), {}, 0.0
-        scenes = [_lit(_triangles(*row), row[-1]) for row in SCENES[core]]
-        standard = [build(scene, STANDARD, core) for scene in scenes]
-        sets = [ray_sets(scene, build(scene, STANDARD), RAYS[core][0], 0) for scene in scenes]
-        looked = [survey(scene, index) for scene, index in zip(scenes, standard)]
-        # What traces more than rays makes other pictures, and its rays are those of another technique.
-        own = [row.name for row in techniques() if row.family not in ("peers", "generalised") and core in row.cores]
-        for name in sorted(own, key=lambda name: (name not in FIRST, FIRST.index(name) if name in FIRST else 0)):
+        scenes, looked, sets = _ground(core)
+        for name in sorted(_ray_by_ray(core), key=lambda name: (name not in FIRST, FIRST.index(name) if name in FIRST else 0)):
             if name in FIRST[:2] or spent < BUDGET:
                 technique(name).load(core)                              # importing is not building
                 start = time.thread_time()
@@ -334,6 +328,34 @@ def calibration(core="fast"):
         models[STANDARD].shading = _shading(scenes[1], models[STANDARD], looked[1], core)
         _known[core] = models, time.perf_counter() - began
     return _known[core]
+
+
+@functools.cache
+def _ground(core):
+    """The scenes of the calibration, their surveys and their rays."""
+    scenes = [_lit(_triangles(*row), row[-1]) for row in SCENES[core]]
+    looked = [survey(scene, build(scene, STANDARD, core)) for scene in scenes]
+    return scenes, looked, [ray_sets(scene, build(scene, STANDARD), RAYS[core][0], 0) for scene in scenes]
+
+
+def _ray_by_ray(core):
+    """The techniques that trace rays; what traces more makes other pictures, and its rays are those of another technique."""
+    return [row.name for row in techniques() if row.family not in ("peers", "generalised") and core in row.cores]
+
+
+@functools.cache
+def rough(core="fast"):
+    """Models of those techniques that there was no time to calibrate, from few rays and two scenes: to say what they would have cost.
+
+    Returns
+    -------
+    dict
+        Technique -> Model.
+    """
+    models, _ = calibration(core)
+    scenes, looked, sets = (some[:TIMED] for some in _ground(core))
+    few = [[batch.take(slice(0, 2 * RAYS[core][1])) for batch in batches] for batches in sets]
+    return {name: _fit(name, core, scenes, looked, few, models[FIRST[0]]) for name in _ray_by_ray(core) if name not in models}
 
 
 def candidates(core="fast"):
@@ -583,6 +605,8 @@ class Plan:
     left_out : list of dict
         what, why, and cost: what it would have taken.
     precision : str
+    tried : dict
+        Kind of ray -> names of what is tried while the picture is traced, if its rays take long enough.
     """
 
     seen: Survey
@@ -591,6 +615,7 @@ class Plan:
     rows: list
     left_out: list = field(default_factory=list)
     precision: str = ""
+    tried: dict = field(default_factory=dict)
 
 
 def plan(scene, size=(640, 480), samples=1, depth=5, core="fast"):
@@ -617,12 +642,14 @@ def plan(scene, size=(640, 480), samples=1, depth=5, core="fast"):
     seen = survey(scene)
     rays = expected_rays(seen, size[0] * size[1], samples, depth)
     choice, rows = choose(seen, rays, core, expected_calls(seen, rays, depth))
-    return Plan(seen, rays, choice, rows, _left_out(seen, rays, choice, rows, core, size[0] * size[1] * samples, depth), _precision(seen))
+    left = _left_out(scene, seen, rays, choice, rows, core, size, samples, depth)
+    tried = {kind: [name for name, _ in some[1:]] for kind, some in contenders(choice, rows).items()} if core == "fast" else {}
+    return Plan(seen, rays, choice, rows, left, _precision(seen), tried)
 
 
-def _left_out(seen, rays, choice, rows, core, primary, depth):
+def _left_out(scene, seen, rays, choice, rows, core, size, samples, depth):
     """What is not built, not imported and not run; why; and what it would have cost."""
-    models, _ = calibration(core)
+    models, primary = calibration(core)[0], size[0] * size[1] * samples
     found = []
 
     def add(what, why, cost):
@@ -636,46 +663,55 @@ def _left_out(seen, rays, choice, rows, core, primary, depth):
     third = max(primary // 3, 1)                                        # as `expected_rays` has it
     if "secondary" not in rays:
         why = "depth is 0" if not depth and (seen.mirrors or seen.glass) else "no material mirrors, refracts or lets light straight through"
-        add("secondary rays", why, f"{time_of('secondary', third)} if a third of what is seen were a mirror, and {_size(core, 'tracing', 'secondary', 'optics')}")
+        add("secondary rays", why, f"{time_of('secondary', third)} if a third of what is seen were a mirror, and {_import(core, 'tracing', 'secondary', 'optics')}")
     if not seen.glass:
         add("refraction", "no material has transmission", f"{time_of('secondary', 2 * third)} if a third of what is seen were glass")
     if "shadow" not in rays:
         add("shadow rays", "no light casts shadows" if seen.dark_lights else "there is no light",
-            f"{time_of('shadow', primary)} to a light, and {_size(core, 'tracing', 'lights', 'shadows')}")
+            f"{time_of('shadow', primary)} to a light, and {_import(core, 'tracing', 'lights', 'shadows')}")
     for name in seen.dark_lights:
         add(f"shadow rays to {name}", "it casts no shadows, or is black", time_of("shadow", primary))
     if not seen.textures:
-        add("textures", "no material has one", f"about {_lookup_seconds(core) * primary:.2g} s to look up {primary:,} colours, and {_size(core, 'tracing', 'texture')}")
+        add("textures", "no material has one", f"about {_lookup_seconds(core) * primary:.2g} s to look up {primary:,} colours, and {_import(core, 'tracing', 'texture')}")
     solid = [k for k in seen.kinds if k not in ("triangle", "instance")]
     if not solid:
-        add("analytic primitives and Booleans", "there are only triangles", _size(core, "primitives", "solids", *SOLIDS))
+        add("analytic primitives and Booleans", "there are only triangles", _import(core, "primitives", "solids", *SOLIDS))
     elif "csg" not in solid:
-        add("Boolean combinations", "no solids are combined", _size(core, "primitives", "csg"))
+        add("Boolean combinations", "no solids are combined", _import(core, "primitives", "csg"))
     if "triangle" not in seen.kinds:
-        add("triangles", "there are only solids", f"{_size(core, 'primitives', 'triangle')}; nothing is built for them")
+        add("triangles", "there are only solids", f"{_import(core, 'primitives', 'triangle')}; nothing is built for them")
     if "instance" not in seen.kinds:
         number = sum(rays.values())
         add("a second level of structures", "no mesh is shared often enough to be kept once",
-            f"about {_change_seconds(core) * number:.2g} s if each of {number:,} rays changed its space once, and {_size(core, 'primitives', 'instance')}")
+            f"about {_change_seconds(core) * number:.2g} s if each of {number:,} rays changed its space once, and {_import(core, 'primitives', 'instance')}")
     else:
         add("copies of shared meshes", f"{seen.kinds['instance']} objects are kept as instances",
             f"{seen.copied:,} triangles, about {seen.copied * TRIANGLE_BYTES / 1e6:,.0f} MB")
-    used = set(choice.values())
+    used, of = set(choice.values()), {row["technique"]: row for row in rows}
     for row in rows:
         if row["technique"] not in used:
             add(row["technique"], f"would take longer than {' and '.join(sorted(used))}" if row["s"] > sum(r["s"] for r in rows if r["technique"] in used)
                 / len(used) else "would gain less than the model is sure of", f"{row['T_B']:.2g} s to build, {row['s']:.2g} s in all")
     for row in techniques():
-        if row.family == "peers" or row.name in {r["technique"] for r in rows}:
-            continue
-        if row.name in models:
-            add(row.name, f"it serves {' and '.join(row.rays)} rays, and there are none", f"{models[row.name].build_seconds(seen.n):.2g} s to build")
+        if row.family == "peers" or row.name in of:
             continue
         if row.family == "generalised":
-            why = "it traces other things than rays, and makes other pictures"
+            seconds = estimate(scene, row.name, core, size, samples, depth).seconds
+            add(row.name, "it traces other things than rays, and makes other pictures",
+                f"about {seconds:.2g} s in all, right to a factor of three, and {_import(core, row.family, row.module, row.tracer.split('.')[1])}")
+            continue
+        model = models.get(row.name) or rough(core)[row.name]
+        served = [kind for kind in rays if kind in row.rays]
+        if not served:
+            add(row.name, f"it serves {' and '.join(row.rays)} rays, and there are none", f"{model.build_seconds(seen.n):.2g} s to build")
+            continue
+        if row.name in models:
+            why = f"its time does not follow from its counters: where it was fitted, the model was off by a factor of {model.off:.2g}"
         else:
-            why = "its time does not follow from its counters, or there was no time left to calibrate it"
-        add(row.name, why, f"{_size(core, row.family, row.module, row.tracer.split('.')[1])}; time only known by trying: rayscope trace --technique {row.name}")
+            why = "calibrating, which takes no more than a second, did not come to it"
+        seconds = sum(model.per_ray(kind, seen.measures)[2] * rays[kind] for kind in served)
+        add(row.name, why, f"about {model.build_seconds(seen.n, len(seen.lights)):.2g} s to build and {seconds:.2g} s for {' and '.join(served)} rays, "
+            f"right to a factor of {max(model.off, ROUGH):.2g}")
     add("the passes N_IT and N_TS", "they are counted only with --count", f"{16 * primary / 1e6:.2g} MB, and adding to them at each test and step")
     return found
 
@@ -684,11 +720,14 @@ def _left_out(seen, rays, choice, rows, core, primary, depth):
 SOLIDS = ("sphere", "box", "cylinder", "cone", "polygon", "polytope", "pyramid", "csg")
 
 
-def _size(core, family, *modules):
-    """How much source of modules is not read, compiled and kept: in words."""
+def _import(core, family, *modules):
+    """What importing modules takes at least, in words: their code is fetched, as an import would, but not run."""
     folder = Path(__file__).parents[1] / core / family
     files = [f for f in (folder / f"{name}.py" for name in modules) if f.is_file()]
-    return f"{sum(f.stat().st_size for f in files) / 1e3:.0f} kB of source in {len(files)} module(s) not imported"
+    start = time.perf_counter()
+    for file in files:
+        SourceFileLoader(file.stem, str(file)).get_code(file.stem)
+    return f"{1e3 * (time.perf_counter() - start):.2g} ms at least to import {len(files)} module(s), {sum(f.stat().st_size for f in files) / 1e3:.0f} kB"
 
 
 def _change_seconds(core):
@@ -739,6 +778,9 @@ def text(result):
         row = next(r for r in result.rows if r["technique"] == name)
         lines.append(f"  {kind} rays: {name} ({technique(name).label}); about {result.rays[kind]:,} rays, {row[f's {kind}']:.2g} s, N_IT {row[f'N_IT {kind}']:.3g}, "
                      f"N_TS {row[f'N_TS {kind}']:.3g} per ray")
+    if any(result.tried.values()):
+        lines.append("  on trial while the picture is traced, if rays take ten times as long as the build: "
+                     + "; ".join(f"{kind} rays: {', '.join(names)}" for kind, names in result.tried.items() if names))
     lines += [f"  {len(set(result.choice.values()))} structure(s), {2 if 'instance' in seen.kinds else 1} level(s); {result.precision}.", "", "Left out:"]
     lines += [f"  {item['what']}: {item['why']}. It would have cost: {item['cost']}." for item in result.left_out]
     columns = ["technique", "T_B", *(f"{c} {kind}" for kind in result.rays for c in ("N_IT", "N_TS", "s")), "s"]
@@ -764,8 +806,8 @@ def against_fixed(scene, size=(160, 120), core="fast", names=None, repeats=3):
     Returns
     -------
     dict
-        scene, choice, automatic (s of the processor, for everything), best (s), best_technique, bvh (s), over_best and over_bvh: automatic over
-        each, minus 1; of the least of all repeats; range: least and largest of automatic over best, minus 1, among the repeats.
+        scene, choice; automatic, best, bvh: the least seconds of the processor, for everything; best_technique; over_best,
+        over_bvh: automatic over each, minus 1, the median of the repeats; range: of over_best among them.
     """
     calibration(core)
     if names is None:
@@ -776,21 +818,22 @@ def against_fixed(scene, size=(160, 120), core="fast", names=None, repeats=3):
             quickest = min(quickest, took[name])
         names = [name for name, seconds in took.items() if seconds <= HOPELESS * quickest]
     names = list(dict.fromkeys((STANDARD, *names)))
+    seconds = {name: [_traced(scene, name, core, size)[0] for _ in range(2)] for name in names}
+    best = min(names, key=lambda name: min(seconds[name]))
+    # The three that matter, in turns: a busy moment hits all alike, and its ratios stay as they are.
     choice, rounds, began = {}, [], time.process_time()
-    for k in range(12):                                                 # interleaved: a busy moment hits all alike
-        spent = time.process_time() - began
-        if k >= repeats and spent > QUICK or k >= 2 and spent > LONG:   # small pictures are drowned in noise
-            break
+    while len(rounds) < repeats or time.process_time() - began < QUICK and len(rounds) < 12:
         rounds.append({})
-        for name in (AUTOMATIC, *names):
+        for name in dict.fromkeys((AUTOMATIC, best, STANDARD)):
             rounds[-1][name], result = _traced(scene, name, core, size)
             choice = {kind: s.technique.name for kind, s in result.structures.items()} if name == AUTOMATIC else choice
-    least = {name: min(row[name] for row in rounds) for name in rounds[0]}
-    best = min(names, key=least.get)
-    ratios = [row[AUTOMATIC] / row[best] - 1.0 for row in rounds]
-    return {"scene": scene.name, "choice": " ".join(f"{k}={v}" for k, v in choice.items()), AUTOMATIC: least[AUTOMATIC], "best": least[best],
-            "best_technique": best, STANDARD: least[STANDARD], "over_best": least[AUTOMATIC] / least[best] - 1.0,
-            "over_bvh": least[AUTOMATIC] / least[STANDARD] - 1.0, "range": f"{min(ratios):+.0%} .. {max(ratios):+.0%}"}
+        if len(rounds) > 1 and time.process_time() - began > LONG:
+            break
+    ratios = {name: sorted(row[AUTOMATIC] / row[name] - 1.0 for row in rounds) for name in (best, STANDARD)}
+    return {"scene": scene.name, "choice": " ".join(f"{k}={v}" for k, v in choice.items()),
+            **{column: min(row[name] for row in rounds) for column, name in ((AUTOMATIC, AUTOMATIC), ("best", best), (STANDARD, STANDARD))},
+            "best_technique": best, "over_best": median(ratios[best]), "over_bvh": median(ratios[STANDARD]),
+            "range": f"{ratios[best][0]:+.0%} .. {ratios[best][-1]:+.0%}"}
 
 
 def _traced(scene, name, core, size, most=math.inf):

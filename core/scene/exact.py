@@ -1,9 +1,20 @@
 """Exact decisions, for the few cases in which rounding errors are as large as the numbers; the same for both cores."""
 
+import math
+
 #: Edge functions whose sum is smaller than this part of the products that they consist of are calculated exactly: above,
 #: rounding moves a hit along the ray by 2^-53 / DOUBTFUL of the triangle's extent at most, and that only where it is seen
 #: edge-on, so that the hit is as little off its plane.
 DOUBTFUL = 2.0**-16
+
+#: How far off t may be, in 2^-52 of |t| and of the scene's size. The watertight test's is off by |t| + (|t| + looseness) / slope at most
+#: (measured; the roundings one by one add up to three times that). slope: sine of the angle between ray and plane, or more exactly, area
+#: seen along the ray's main axis by area; looseness: the triangle's extent, plus its cube by twice the area, as the weights in narrow
+#: triangles are badly determined. Beyond what is allowed t is calculated again: from near by (:func:`nearby`), where the looseness alone
+#: allows that, else exactly (:func:`crossing`).
+ALLOWED = 8.0
+#: Dekker's factor: splits 53 bits into 26 and 27.
+SPLIT = 2.0**27 + 1.0
 
 
 def watertight(a, b, c, *corners):
@@ -32,15 +43,103 @@ def watertight(a, b, c, *corners):
     return u / det, v / det, w / det
 
 
+def rounding(a, b, c):
+    """What tells how far rounding may move t on a triangle: twice its area, and that times its looseness."""
+    e, f, g = _minus(b, a), _minus(c, a), _minus(c, b)
+    extent = max(abs(x) for x in (*e, *f, *g))
+    x, y, z = _cross(e, f)
+    area = math.sqrt(x * x + y * y + z * z)
+    return area, extent * (area + extent * extent)
+
+
+def refined(o, d, corners, t, low, high, deep):
+    """t once more, where a line crosses the plane of a triangle.
+
+    But not where that is beside the triangle: of a ray that lies in the plane all but for rounding any t is right within it.
+
+    Parameters
+    ----------
+    o, d : sequence of 3 float
+    corners : sequence of 3 sequences of 3 float
+    t : float
+        As the watertight test has it.
+    low, high : float
+        The least and the most t of the vertices.
+    deep : bool
+        Exactly, instead of from near by.
+    """
+    found = crossing(o, d, *corners) if deep else nearby(o, d, *corners, t)
+    slack = 2.0**-50 * abs(t)
+    return min(max(found, low), high) if low - slack <= found <= high + slack else t
+
+
+def nearby(o, d, a, b, c, t):
+    """Where a line crosses the plane of a triangle, but for rounding errors of the triangle's size; t: about there."""
+    normal = _cross(_minus(b, a), _minus(c, a))
+    slope = _dot(normal, d)
+    t, _ = _split(t)
+    off = []
+    for x, y, p in zip(o, d, a):
+        # From a vertex to the line's point at t, without rounding up to the last two sums.
+        upper, lower = _split(y)
+        whole = x - p
+        back = whole - x
+        off.append((whole + upper * t) + (lower * t + ((x - (whole - back)) - (p + back))))
+    return t - _dot(normal, off) / slope if slope else math.nan
+
+
+def _split(x):
+    """A number as the sum of two of 26 bits each."""
+    y = SPLIT * x
+    upper = y - (y - x)
+    return upper, x - upper
+
+
+def crossing(o, d, a, b, c):
+    """Where a line crosses the plane of a triangle: t, rounded once.
+
+    Parameters
+    ----------
+    o, d : sequence of 3 float
+        A point of the line, and its direction.
+    a, b, c : sequence of 3 float
+
+    Returns
+    -------
+    float
+        NaN where the line is parallel to the plane, the triangle has no area, or t is beyond all floats.
+    """
+    whole = iter(_whole(*o, *d, *a, *b, *c))
+    o, d, a, b, c = zip(whole, whole, whole)
+    normal = _cross(_minus(b, a), _minus(c, a))
+    slope = _dot(normal, d)
+    try:
+        return _dot(normal, _minus(a, o)) / slope if slope else math.nan
+    except OverflowError:
+        return math.nan
+
+
 def collinear(a, b, c):
     """Whether three points lie on one line."""
-    n = _whole(*a, *b, *c)
-    e, f = [n[3 + k] - n[k] for k in range(3)], [n[6 + k] - n[k] for k in range(3)]
-    return all(e[i - 2] * f[i - 1] == e[i - 1] * f[i - 2] for i in range(3))
+    whole = iter(_whole(*a, *b, *c))
+    a, b, c = zip(whole, whole, whole)
+    return not any(_cross(_minus(b, a), _minus(c, a)))
+
+
+def _minus(a, b):
+    return a[0] - b[0], a[1] - b[1], a[2] - b[2]
+
+
+def _cross(a, b):
+    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
+
+
+def _dot(a, b):
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
 def _whole(*numbers):
     """Whole numbers in the same ratios: all times one power of two."""
     ratios = [x.as_integer_ratio() for x in numbers]
-    common = max(d for _, d in ratios)
-    return [n * (common // d) for n, d in ratios]
+    most = max(d for _, d in ratios).bit_length()
+    return [n << most - d.bit_length() for n, d in ratios]

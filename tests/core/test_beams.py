@@ -374,13 +374,16 @@ def test_less_error_than_64_samples_in_less_time():
     scene, size, depth = polygonal_room(), (48, 36), 3
     trace(scene, "beams", size=(4, 3), depth=depth)  # imports
     reference, _ = many_samples(scene, size, depth, 48)
-    spent, rmse = [], []
-    for options in ({"technique": "beams"}, {"samples": 64, "sampling": "random"}):
-        start = time.process_time()
-        image = trace(scene, size=size, depth=depth, **options).image
-        spent.append(time.process_time() - start)
-        rmse.append(errors(image, reference)["rmse"])
-    assert rmse[0] < rmse[1] and spent[0] < spent[1]
+    ways = ({"technique": "beams"}, {"samples": 64})
+    spent, rmse = [[], []], [0.0, 0.0]
+    for _ in range(3):
+        for k, options in enumerate(ways):
+            start = time.process_time()
+            image = trace(scene, size=size, depth=depth, **options).image
+            spent[k].append(time.process_time() - start)
+            rmse[k] = errors(image, reference)["rmse"]
+    # Stratified samples, too, have more than the reference's own error.
+    assert rmse[0] < rmse[1] and min(spent[0]) < min(spent[1]), (rmse, spent)
 
 
 def test_glass_is_nearly_that_of_many_rays():

@@ -113,3 +113,30 @@ def test_both_cores_alike():
             assert pure.moments_in_disc(polygon) == pytest.approx(disc, abs=1e-14)
         parts = pure.subtract(listed(SQUARE), listed(lines[i]))
         assert sorted(map(pure.area, parts)) == pytest.approx(sorted(fast.area(left[owner == i])), abs=1e-14)
+
+
+@pytest.mark.parametrize("core", [fast, pure])
+def test_four_points_have_the_mean_and_the_spread_of_a_polygon(core):
+    rng = np.random.default_rng(12)
+    for n in (3, 4, 7):
+        angle = np.sort(rng.random(n)) * 2.0 * np.pi
+        polygon = np.stack([3.0 + np.cos(angle), -1.0 + 0.4 * np.sin(angle)], axis=1)
+        # By many points: those of a lattice that lie inside.
+        x, y = (a.ravel() for a in np.meshgrid(np.linspace(2, 4, 1201), np.linspace(-1.4, -0.6, 601)))
+        ahead = np.roll(polygon, -1, axis=0)
+        side = [(b[0] - a[0]) * (y - a[1]) - (b[1] - a[1]) * (x - a[0]) for a, b in zip(polygon, ahead)]
+        inside = np.min(side, axis=0) >= 0.0
+        x, y = x[inside], y[inside]
+        if core is fast:
+            area, first = (a[0] for a in fast.moments(polygon[None]))
+            second = fast.second_moments(polygon[None], np.array([[3.0, -1.0]]))[:, 0]
+        else:
+            area, *first = pure.moments([tuple(p) for p in polygon])
+            second = pure.second_moments([tuple(p) for p in polygon], (3.0, -1.0))
+        centre = np.array(first) / area
+        cx, cy = centre - (3.0, -1.0)
+        spread = np.array(second) / area - (cx * cx, cx * cy, cy * cy)
+        four = fast.nodes(centre[None], spread[:, None])[:, 0] if core is fast else np.array(pure.nodes(tuple(centre), spread))
+        assert four.mean(axis=0) == pytest.approx(centre, abs=1e-12)
+        for f in (lambda x, y: x * x, lambda x, y: x * y, lambda x, y: y * y + x):
+            assert f(*four.T).mean() == pytest.approx(f(x, y).mean(), abs=2e-3)

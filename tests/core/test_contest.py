@@ -68,7 +68,7 @@ def test_answers_are_those_of_any(built, n):
 
 def test_the_quickest_gets_the_rays(built):
     slow, quick = Slow(built[0], 1e-4), Slow(built[1], 0.0)
-    contest = Contest(slow, [(lambda: quick, 0.01)], 200_000)
+    contest = Contest(slow, [(lambda: quick, 0.04)], 200_000)
     rays = ray_sets(SCENE, built[0], 8000, 0)[0]
     for k in range(12):
         rays.ask(contest)

@@ -1,6 +1,7 @@
 """What a picture needs: the survey, the model, the choice, and that nothing else is imported or built."""
 import json
 import os
+import re
 import subprocess
 import sys
 from time import thread_time
@@ -52,11 +53,11 @@ def test_measures(core):
     assert nested.pierced == pytest.approx(1.0 + 1.25, rel=0.01)
     even, drawn = (needs.survey(scene, build(scene, "bvh", core)).measures for scene in (needs._triangles(300), needs._triangles(300, 0.3, 4.0)))
     assert even.crowd < 5.0 < 20.0 < drawn.crowd < drawn.listed
-    assert 3.0 < even.cells < 20.0 and even.nodes > even.pierced
+    assert 3.0 < even.cells < 60.0 and even.nodes > even.pierced
 
 
 def test_measures_follow_counts():
-    """A grid's steps and tests, of scenes that no model was fitted on, are foretold to a factor of two; a bvh's to three."""
+    """Steps and tests, in scenes that no model was fitted on, are foretold to a factor of two and a half; in crowded ones to four."""
     models, _ = needs.calibration()
     for n, side, drawn in ((2000, 1.0, 0.0), (400, 2.0, 0.0), (500, 0.3, 3.0)):
         scene = needs._lit(needs._triangles(n, side, drawn), drawn)
@@ -66,7 +67,7 @@ def test_measures_follow_counts():
             for index in (standard, build(scene, "grid")):
                 n_it, n_ts, _ = models[index.technique.name].per_ray(rays.kind, seen.measures)
                 counted = needs._counted(index, rays)
-                factor = 2.0 if index is not standard else 3.0
+                factor = 4.0 if drawn else 2.5
                 assert 1.0 / factor < n_it / counted[0] < factor and 1.0 / factor < n_ts / counted[1] < factor
 
 
@@ -132,6 +133,8 @@ def test_techniques_for_some_kinds_of_ray_are_chosen_for_these(monkeypatch):
     seen = needs.survey(lit)
     models = {"bvh": model(1.0, 1e-3), "light-buffer": model(1e-9, 1e-5, "shadow", lazy=(np.log(2.0), 0.0), lights=True),
               "image-directory": model(0.1, 1e-6)}
+    fitted = needs.calibration()[0] | needs.rough("fast")
+    monkeypatch.setattr(needs, "rough", lambda core: fitted)
     monkeypatch.setitem(needs._known, "fast", (models, 0.0))
     few, many = {"primary": 10, "shadow": 1000}, {"primary": 100_000, "shadow": 100_000}
     assert needs.choose(seen, few)[0] == {"primary": "bvh", "shadow": "bvh"}            # three lights' buffers are dearer
@@ -189,6 +192,11 @@ def test_plan_says_what_is_left_out():
     assert all(any(c.isdigit() and c != "0" for c in item["cost"]) for item in plan.left_out)
     named = {name for item in plan.left_out for name in item["what"].split(", ")} | set(plan.choice.values())
     assert {t.name for t in catalogue.techniques() if t.family != "peers"} <= named
+    # Of every technique a time is told: fitted, fitted on few rays, or estimated.
+    times = {item["what"]: item["cost"] for item in plan.left_out if item["what"] in {t.name for t in catalogue.techniques()}}
+    assert times and all(re.search(r"\d s (to build|in all)", cost) for cost in times.values())
+    assert all(re.search(r"[\d.]+ ms at least to import", left[what]["cost"]) for what in ("secondary rays", "textures", "analytic primitives and Booleans"))
+    assert set(plan.tried) == {"primary"} and plan.choice["primary"] not in plan.tried["primary"]
     other = needs.plan(scene_of((Material("glass", transmission=1.0),), objects=[Object("ball", Shapes([solids.sphere((0, 0, 3), 1.0)]))]))
     assert not {"secondary rays", "refraction", "analytic primitives and Booleans"} & {item["what"] for item in other.left_out}
     assert set(other.choice) == {"primary", "secondary"}

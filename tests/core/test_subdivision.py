@@ -49,7 +49,7 @@ def counts(index, o, d, **more):
 WALKS = ("root", "intervals", "links", "heap")
 #: Combinations of parameters that test_properties does not try, since it changes one at a time.
 COMBINATIONS = [
-    ("grid", dict(walk="subtract", lists="shared", mailbox=False)),
+    ("grid", dict(walk="subtract", lists="shared", mailbox=False, density=4.0)),
     ("grid", dict(walk="add", rule="regular", density=20.0)),
     ("grid", dict(rule="heterogeneous", resolution=9)),
     ("separated-grid", dict(axes=2, intersect="sorted", mailbox=False)),
@@ -360,7 +360,7 @@ def test_candidates_that_are_forgotten_are_found_again(intersect, monkeypatch):
     found = index.closest(o, d, count=True)
     for own in (hits, found, index.closest(o, d)):
         assert np.array_equal(own.t, truth.t) and np.array_equal(own.primitive, truth.primitive)
-    exact = build(scene, "grid")
+    exact = build(scene, "grid", density=4.0)
     assert np.array_equal(found.n_ts, exact.closest(o, d, count=True).n_ts) and found.n_it.sum() > 1000
 
 

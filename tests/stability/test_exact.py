@@ -125,3 +125,35 @@ def test_many_edge_functions_are_those_of_whole_numbers(kind):
     _, open_ = exact_edges._distilled(p, q)
     assert open_.mean() > 0.9 if kind == "wide" else not open_.any()     # what numpy decides, and what is left to whole numbers
     assert right.any(axis=0).any() or kind == "two corners alike"
+
+
+@pytest.mark.parametrize("aspect", [1.0, 1e3, 1e6, 1e12])
+@pytest.mark.parametrize("slope", [1.0, 1e-2, 1e-6, 1e-12])
+def test_crossings_are_exact(aspect, slope):
+    """In whole numbers, in double-double arithmetic, and near the triangle in plain numbers."""
+    from rayscope.core.fast.primitives.exact_crossing import crossings, nearby
+    from rayscope.core.scene.exact import crossing, nearby as near_one
+    rng, m = np.random.default_rng(7), 60
+    a, along, across = rng.normal(size=(3, 3, m))
+    a += rng.integers(0, 2, m) * 1e6
+    rows = np.concatenate([a, a + along, a + along * rng.random(m) + across / aspect])
+    d = rng.normal(size=m) * along + rng.normal(size=m) * across + slope * np.cross(along.T, across.T).T
+    d /= np.abs(d).max(axis=0)
+    o = (rows.reshape(3, 3, m) * rng.dirichlet((1.0, 1.0, 1.0), m).T[:, None]).sum(axis=0) - d * rng.uniform(0.1, 3.0, m)
+    right = [exact.triangle_plane(*(x[:, k].tolist() for x in (o, d, *rows.reshape(3, 3, m))))[0] for k in range(m)]
+    for k in range(m):
+        assert crossing(*(x[:, k].tolist() for x in (o, d, *rows.reshape(3, 3, m)))) == float(right[k])
+    t = np.array(right, float) * (1.0 + 1e-9 * rng.normal(size=m))
+    assert np.array_equal(crossings(o, d, rows, t), [float(x) for x in right])
+    near = nearby(o, d, rows, t)
+    assert np.array_equal(near, [near_one(*(x[:, k].tolist() for x in (o, d, *rows.reshape(3, 3, m))), t[k]) for k in range(m)], equal_nan=True)
+    if aspect == 1.0 and slope == 1e-2:
+        errors = np.abs([float(Fraction(x) - y) for x, y in zip(near.tolist(), right)])
+        assert errors.max() < 1e4 * 2.0**-52 and errors.max() < 0.01 * 1e6 * 2.0**-52   # of the triangle's size, not of the distance
+
+
+def test_crossings_that_are_none():
+    from rayscope.core.fast.primitives.exact_crossing import crossings
+    rows = np.array([(0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0), (0.0, 0.0, 0.0, 1.0, 1.0, 1.0, 2.0, 2.0, 2.0)]).T
+    o, d = np.array([(0.2, 0.2, 1.0)] * 2).T, np.array([(1.0, 0.0, 0.0), (0.0, 0.0, -1.0)]).T
+    assert np.isnan(crossings(o, d, rows, np.ones(2))).all()

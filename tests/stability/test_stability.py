@@ -47,8 +47,7 @@ def test_brute_force_finds_what_is_exactly_there(case, known):
     assert row["rays"] == len(some)
     assert not row["bad"], row
     assert row["off_surface"] <= 16.0
-    if not case.sweep or case.sweep[0] != "aspect":                      # nearly parallel to the plane, t is as badly conditioned as it is exact
-        assert row["t_error"] <= 8.0, row
+    assert row["t_error"] <= 8.0, row                                    # also nearly parallel to a plane, and on slivers
 
 
 @pytest.mark.parametrize("case", CASES.values(), ids=lambda c: c.name)

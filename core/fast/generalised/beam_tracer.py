@@ -1,7 +1,7 @@
 """Pictures from beams: every pixel is the sum, by area, of the fragments that lie in it.
 
-What of a surface is seen in a pixel has the shading of its centre; what of it is lit by a light has the highlight of the
-lit part's centre. Visibility, mirrors and the shadows of lights without extent are exact, refraction is paraxial. The
+What of a surface is seen in a pixel has the colour of its centre; what of it is lit by a light is shaded at four points,
+which is exact up to the third order. Visibility, mirrors and the shadows of lights without extent are exact, refraction is paraxial. The
 rest is sampled by rays, several a pixel: what lies beyond the boxes around primitives that are no polygons, what is seen
 in smooth-shaded (curved) mirrors and in glass at grazing angles, soft shadows, and light that has come through glass.
 """
@@ -12,6 +12,7 @@ from ...beams import SAMPLES, fragments_notice
 from ..tracing import sampling
 from ..tracing.secondary import mirrored_and_refracted
 from ..tracing.whitted import KINDS, PRIMARY, REFLECTED, REFRACTED, TRANSPARENT, Wave, Whitted
+from . import clipping
 from .beam_clip import in_pixels
 from .beam_walk import SKY
 from .outlines import scattered
@@ -150,19 +151,26 @@ class BeamTracer(Whitted):
         group[group == len(keys)] = 0
         good = np.flatnonzero(keys[group] == key)  # but for pieces of no area at a pixel's border
         group, part_area, part_centre, light = group[good], parts.area[good], parts.centre[good], light[parts.polygon[good]]
+        corner = np.stack([parts.x, parts.y], axis=1)[good].astype(float)
+        part_second = clipping.second_moments(parts.points[good], corner)
         for k, number in enumerate(self.hard):
             self.check()
             some = np.flatnonzero(light == k)
-            lit_area = np.bincount(group[some], part_area[some], len(keys))
-            first = np.stack(
-                [np.bincount(group[some], part_area[some] * part_centre[some, c], len(keys)) for c in range(2)], axis=1
-            )
+
+            def total(values):
+                return np.bincount(group[some], values[some], len(keys))
+
+            lit_area = total(part_area)
+            first = np.stack([total(part_area * part_centre[:, c]) for c in range(2)], axis=1)
             which = np.flatnonzero(lit_area > 0.0)
             if len(which):
                 own_centre = first[which] / lit_area[which, None]
-                _, at, d = self.tree.surfaces_at(beam[which], surface[which], own_centre)
-                seen = self._lit(at, d, [number], pixel[which], None, lambda s, which, *_: np.ones(len(which)))
-                self._add(pixel[which], weight[:, which] * lit_area[which] * seen)
+                x, y = (own_centre - np.stack([pixel[which] % self.width, pixel[which] // self.width], axis=1) - self.corner).T
+                spread = np.stack([total(part)[which] for part in part_second]) / lit_area[which] - [x * x, x * y, y * y]
+                four = np.tile(which, 4)
+                _, at, d = self.tree.surfaces_at(beam[four], surface[four], clipping.nodes(own_centre, spread).reshape(-1, 2))
+                seen = self._lit(at, d, [number], pixel[four], None, lambda s, which, *_: np.ones(len(which)))
+                self._add(pixel[four], weight[:, four] * (0.25 * lit_area[four]) * seen)
             rest = np.flatnonzero(area - lit_area > LEAST) if self.doubtful or k in self.tree.dark else ()
             if len(rest):
                 left = area[rest] - lit_area[rest]

@@ -107,6 +107,41 @@ def moments(corners):
     return area, (twice[..., None] * (a[:, :-1] + a[:, 1:])).sum(axis=1) / 6.0 + area[:, None] * corners[:, 0]
 
 
+def second_moments(corners, origin):
+    """Integrals of x x, x y and y y over polygons in the plane, seen from an origin each; shape (3, n)."""
+    a = corners - origin[:, None]
+    p, q, r = a[:, :1], a[:, 1:-1], a[:, 2:]
+    e, f = q - p, r - p
+    twice = e[..., 0] * f[..., 1] - e[..., 1] * f[..., 0]
+    x, y = (p[..., c] + q[..., c] + r[..., c] for c in (0, 1))
+    pairs = [(x, x, 0, 0), (x, y, 0, 1), (y, y, 1, 1)]
+    return np.stack([
+        (twice * (s * t + sum(c[..., i] * c[..., j] for c in (p, q, r)))).sum(axis=1) / 24.0 for s, t, i, j in pairs
+    ])
+
+
+def nodes(centre, spread):
+    """Four points of equal weight at which a function's mean is that over a region, up to the function's third order.
+
+    Parameters
+    ----------
+    centre : ndarray, shape (n, 2)
+    spread : ndarray, shape (3, n)
+        The region's means of x x, x y, y y, seen from its centre.
+
+    Returns
+    -------
+    ndarray, shape (4, n, 2)
+        As far to either side along two directions as makes their spread the region's.
+    """
+    xx, xy, yy = spread
+    a = np.sqrt(np.maximum(xx, 0.0))
+    b = xy / np.where(a > 0.0, a, 1.0)
+    c = np.sqrt(np.maximum(yy - b * b, 0.0))
+    e, f = np.sqrt(2.0) * np.stack([a, b], axis=-1), np.sqrt(2.0) * np.stack([np.zeros_like(c), c], axis=-1)
+    return np.stack([centre + e, centre - e, centre + f, centre - f])
+
+
 def moments_in_disc(corners):
     """As :func:`moments`, of the parts of polygons inside the unit disc.
 

@@ -7,7 +7,7 @@ is counted with whole numbers, as :func:`~rayscope.core.scene.exact.watertight` 
 
 import numpy as np
 
-from ...scene.exact import watertight
+from ...scene.exact import SPLIT, watertight
 
 #: Below so many pairs whole numbers are quicker than numpy's calls.
 FEW = 24
@@ -17,8 +17,6 @@ SMALLEST = 2.0**-250
 SURE = 2.0**-140
 #: Distillations: each leaves 2^-53 of the error of the one before.
 PASSES = 4
-#: Dekker's factor: splits 53 bits into 26 and 27.
-SPLIT = 2.0**27 + 1.0
 
 
 def edge_functions(p, q, corners):
@@ -51,7 +49,7 @@ def _distilled(p, q):
     p, few_p = _scaled(p)
     q, few_q = _scaled(q)
     # u = p2 q1 - q2 p1, v = p0 q2 - q0 p2, w = p1 q0 - q1 p0: each is four numbers, exactly.
-    one, two = _product(p[[2, 0, 1]], q[[1, 2, 0]]), _product(-q[[2, 0, 1]], p[[1, 2, 0]])
+    one, two = product(p[[2, 0, 1]], q[[1, 2, 0]]), product(-q[[2, 0, 1]], p[[1, 2, 0]])
     parts = [one[1], two[1], one[0], two[0]]
     edges, edge_zero, edge_sure = _sum(parts)
     total, zero, sure = _sum([part[k] for part in parts for k in range(3)])
@@ -60,7 +58,7 @@ def _distilled(p, q):
     with np.errstate(divide="ignore", invalid="ignore"):
         quotient = edges[0] / total[0]
         # What the quotient leaves, exactly as far as it matters.
-        back = _product(quotient, np.broadcast_to(total[0], quotient.shape))
+        back = product(quotient, np.broadcast_to(total[0], quotient.shape))
         rest = (edges[0] - back[0]) - back[1] + edges[1] - quotient * total[1]
         quotient = quotient + rest / total[0]
     quotient[:, outside] = 0.0
@@ -76,7 +74,7 @@ def _scaled(x):
     return x, ((x != 0.0) & (np.abs(x) < SMALLEST)).any(axis=0) | (size.max(axis=0) == 0.0)
 
 
-def _product(a, b):
+def product(a, b):
     """A product, rounded, and its error."""
     whole = a * b
     c, d = SPLIT * a, SPLIT * b

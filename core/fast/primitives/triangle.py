@@ -5,11 +5,14 @@ two rounded products, whose sign is right or zero whatever the rounding. Neighbo
 so a ray cannot slip between them.
 """
 
+from functools import cached_property
+
 import numpy as np
 
-from ...scene.exact import DOUBTFUL, collinear
+from ...scene.exact import ALLOWED, DOUBTFUL, collinear
 from ...scene.layout import mirrors, to_world
 from .cut import boxes_inside
+from .exact_crossing import refined
 from .exact_edges import edge_functions
 
 #: gamma(7): relative error of a point interpolated from three vertices (Pharr et al., PBR 4th ed., 6.8.5).
@@ -123,13 +126,14 @@ class Triangles:
             u, v, w, sz, hit_ray = u.take(pair), v.take(pair), w.take(pair), sz.take(pair), ray.take(pair)
             x, y, z = ([column.take(pair) for column in axis] for axis in (x, y, z))
         det = u + v + w
+        seen = np.abs(det)
         # Seen edge-on, or hardly a triangle: the edge functions are little but rounding errors.
         largest = [np.maximum(np.maximum(np.abs(a[0]), np.abs(a[1])), np.abs(a[2])) for a in (x, y)]
-        doubtful = np.flatnonzero(np.abs(det) <= (6.0 * DOUBTFUL) * largest[0] * largest[1])
+        doubtful = np.flatnonzero(seen <= (6.0 * DOUBTFUL) * largest[0] * largest[1])
         if len(doubtful):
             p, q = ([column.take(doubtful) for column in axis] for axis in (x, y))
             products = sum(np.abs(p[i] * q[j]) for i, j in ((2, 1), (1, 2), (0, 2), (2, 0), (1, 0), (0, 1)))
-            some = np.flatnonzero(np.abs(det.take(doubtful)) <= DOUBTFUL * products)
+            some = np.flatnonzero(seen.take(doubtful) <= DOUBTFUL * products)
             doubtful, p, q = doubtful.take(some), *([column.take(some) for column in axis] for axis in (p, q))
             # No area to be hit, exactly: nothing needs to be calculated one by one.
             flat = (p[0] == p[1]) & (p[1] == p[2]) | (q[0] == q[1]) & (q[1] == q[2]) | self._collinear(item.take(pair.take(doubtful)))
@@ -142,13 +146,47 @@ class Triangles:
             for column, value in zip((u, v, w, det), (*exact, exact[0] + exact[1] + exact[2])):
                 column[doubtful] = value
         with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-            t = (u * (sz * z[0]) + v * (sz * z[1]) + w * (sz * z[2])) / det
+            z = [sz * c for c in z]                                     # t of the vertices
+            t = (u * z[0] + v * z[1] + w * z[2]) / det
+            # Seen at a grazing angle, or narrow: t may be off by more than is allowed.
+            area, loose = (column.take(item.take(pair)) for column in self.rounding)
+            distance = np.abs(t / sz)
+            bound = seen * (ALLOWED * np.maximum(distance, self.size) - distance)
+            some = np.flatnonzero(distance * area + loose > bound)
+        if len(some):
+            at, z = hit_ray.take(some), [c.take(some) for c in z]
+            low, high = np.minimum(np.minimum(z[0], z[1]), z[2]), np.maximum(np.maximum(z[0], z[1]), z[2])
+            rows = self._flat.reshape(-1, 9).take(item.take(pair.take(some)), axis=0).T
+            t[some] = refined(rays.o.take(at, axis=1), rays.d.take(at, axis=1), rows, t.take(some), low, high, (loose > bound).take(some))
         good = np.flatnonzero((t >= rays.t_min.take(hit_ray)) & (t <= t_far.take(hit_ray)) & np.isfinite(t))
         if len(good) < len(pair):
             pair, det, t, v, w = pair.take(good), det.take(good), t.take(good), v.take(good), w.take(good)
         v /= det
         w /= det
         return pair, t, v, w, np.zeros(len(pair), np.int64)
+
+    @cached_property
+    def size(self):
+        """The diagonal of the triangles' common box: what t's errors are measured by."""
+        lo, hi = self.bounds()
+        with np.errstate(over="ignore"):
+            x, y, z = hi.max(axis=0) - lo.min(axis=0)
+            return float(np.sqrt(x * x + y * y + z * z))
+
+    @cached_property
+    def rounding(self):
+        """What tells how far rounding may move t on each triangle, shape (2, n): see :func:`~rayscope.core.scene.exact.rounding`."""
+        found = np.empty((2, self.n))
+        for first in range(0, self.n, PAIRS):
+            some = slice(first, first + PAIRS)
+            a, b, c = self.xyz[0:3, some], self.xyz[3:6, some], self.xyz[6:9, some]
+            e, f, g = b - a, c - a, c - b
+            with np.errstate(over="ignore", invalid="ignore"):
+                extent = np.maximum(np.maximum(np.abs(e), np.abs(f)), np.abs(g)).max(axis=0)
+                x, y, z = e[1] * f[2] - e[2] * f[1], e[2] * f[0] - e[0] * f[2], e[0] * f[1] - e[1] * f[0]
+                area = np.sqrt(x * x + y * y + z * z)
+                found[:, some] = area, extent * (area + extent * extent)
+        return found
 
     def _collinear(self, item):
         """Whether triangles have no area; found out exactly, once for each."""

@@ -15,7 +15,7 @@ import numpy as np
 from ..hierarchies.wide import along_curve
 
 #: Rays in the pool, steps between two looks at who is done, and the part that must be done for the pool to be filled up.
-POOL, STEPS, DONE = 16_384, 4, 8
+POOL, STEPS, DONE = 32_768, 4, 8
 #: A component of a direction, relative to the largest, with which a ray crosses no plane.
 STILL = 2.0**-60
 
@@ -82,10 +82,11 @@ def walk(grid, regions, rays, ray, t_in, t_out, visits, query):
     waiting = _columns(grid, rays, ray, t_in, t_out)
     n, begin = len(ray), min(POOL, len(ray))
     pool = [column[:begin] for column in waiting]
+    first = np.empty(query.t.size, np.int64)
     top = math.prod(grid.resolution.tolist()) - 1
     stride = [np.int32(s) if top < 2**31 else s for s in grid.stride]
     while len(pool[0]):
-        k, flip, first, gap, rate, place = (pool[i : i + 3] for i in range(0, 18, 3))
+        k, flip, plane, gap, rate, place = (pool[i : i + 3] for i in range(0, 18, 3))
         t, t_end, ray = pool[18:]
         found = []
         for _ in range(STEPS):
@@ -96,10 +97,10 @@ def walk(grid, regions, rays, ray, t_in, t_out, visits, query):
             if len(filled):
                 found.append([column.take(filled) for column in (ray, cell, t)])
             t = last[0] * gap[0]
-            t += first[0]
+            t += plane[0]
             for axis in (1, 2):
                 other = last[axis] * gap[axis]
-                other += first[axis]
+                other += plane[axis]
                 np.minimum(t, other, out=t)
             k = []
             for axis in range(3):
@@ -110,7 +111,16 @@ def walk(grid, regions, rays, ray, t_in, t_out, visits, query):
             mine, cell, entry = (np.concatenate(c) for c in zip(*found))
             # A ray that is through goes on outside until it is missed; what it is in there does not matter.
             inside = np.flatnonzero((entry <= query.t.take(mine)) & (cell >= 0) & (cell <= top))
-            visits.enter(mine.take(inside), cell.take(inside))
+            # First each ray's first cell, which most rays get no further than; then what is left before their hits.
+            number = np.arange(len(inside))
+            own = mine.take(inside)
+            first[own[::-1]] = number[::-1]
+            is_first = first.take(own) == number
+            visits.enter(own[is_first], cell.take(inside[is_first]))
+            later = inside[~is_first]
+            later = later[entry.take(later) <= query.t.take(mine.take(later))]
+            if len(later):
+                visits.enter(mine.take(later), cell.take(later))
         through = t >= np.minimum(t_end, query.t.take(ray))
         alive = np.flatnonzero(~through)
         pool[:3], pool[18], pool[19] = k, t, np.where(through, -np.inf, t_end)

@@ -1,19 +1,19 @@
 """Which pairs of rays and primitives in a cell are worth testing: the ray's line against the primitive's box.
 
 As in the packed hierarchy (``hierarchies.wide``), four boxes lie side by side in lines of sixteen bytes, so that one
-``take`` fetches four numbers and all arithmetic runs on contiguous arrays. A line misses a box when one of the three
-cross products of its direction with the axes separates them. In float32, with room for every rounding: no pair that
-hits is ever left out, so that leaving out changes no hit.
+``take`` fetches four numbers and all arithmetic runs on contiguous arrays. As in the watertight test of triangles, axes
+are renamed so that z is the direction's largest component, and the line is x = px + sx z, y = py + sy z. It is held against
+the box's outlines in the planes xz and yz; against that in xy, where it is shortest, it hardly ever matters. In float32,
+with room for every rounding: no pair that hits is ever left out, so that leaving out changes no hit.
 """
 
 import numpy as np
 
+from ..rays import AXES
 from .lists import chunks, ranges
 
 #: In units of the scene's longest edge: what float32 may lose of centres, origins and products, and twice as much again.
 PAD = 2.0**-20
-#: Components of directions below this are taken for zero; that moves a line by less than `LOOSE`.
-TINY, LOOSE = 2.0**-60, np.float32(2.0**-57)
 #: Boxes looked at together: columns that stay in the cache.
 BOXES = 16_384
 
@@ -29,7 +29,7 @@ class Boxes:
 
     Attributes
     ----------
-    lines : list of 6 ndarray
+    lines : ndarray, shape (6, boxes)
         Centres x, y, z, then half-widths: in units of the scene's size, from its centre.
     """
 
@@ -43,17 +43,32 @@ class Boxes:
         self.size = float((high - low).max()) or 1.0
         centre = (0.5 * lo + 0.5 * hi - self.centre) / self.size
         half = (0.5 * hi - 0.5 * lo + margin) / self.size * (1.0 + PAD) + PAD
-        self.lines = [values[:, axis].astype(np.float32) for values in (centre, half) for axis in range(3)]
+        self.lines = np.concatenate([centre.T, half.T]).astype(np.float32)
 
     @property
     def nbytes(self):
-        return sum(line.nbytes for line in self.lines)
+        return self.lines.nbytes
 
     def aim(self, rays, t):
-        """Lines of rays that are near the scene at t: origins x, y, z there, then directions, SIDE_BY_SIDE times each."""
+        """What is to be known of rays that are near the scene at t.
+
+        Returns
+        -------
+        axes : tuple of 3 int, or ndarray, shape (3, n)
+            Which axes are their x, y, z: the same for all, or each ray's.
+        px, py, sx, sy : ndarray
+            SIDE_BY_SIDE times each.
+        """
         o = (rays.o + t * rays.d - self.centre[:, None]) / self.size
-        d = np.where(np.abs(rays.d) < TINY, 0.0, rays.d)
-        return [np.repeat(x.astype(np.float32), self.SIDE_BY_SIDE).view(self.LINE) for x in (*o, *d)]
+        if rays.main is not None:
+            axes = rays.main
+            (ox, oy, oz), (dx, dy, dz) = ([columns[k] for k in axes] for columns in (o, rays.d))
+        else:
+            axes = AXES.take(rays.side, axis=1)
+            (ox, oy, oz), (dx, dy, dz) = (np.take_along_axis(columns, axes, 0) for columns in (o, rays.d))
+        sx, sy = dx / dz, dy / dz
+        lines = (ox - sx * oz, oy - sy * oz, sx, sy)
+        return axes, [np.repeat(x.astype(np.float32), self.SIDE_BY_SIDE).view(self.LINE) for x in lines]
 
     def pairs(self, aimed, ray, item, first, count):
         """The pairs (ray, primitive) that may hit, of rays with the primitives item[first], item[first + 1], ...; count >= 1."""
@@ -67,28 +82,28 @@ class Boxes:
 
     def _met(self, aimed, ray, place):
         """Which boxes the rays' lines meet, of pairs of a ray and a line of boxes: numbers SIDE_BY_SIDE x pair + box."""
-        x, y, z = (self.lines[a].take(place).view(np.float32) for a in range(3))
-        for w, a in ((x, 0), (y, 1), (z, 2)):
-            w -= aimed[a].take(ray).view(np.float32)
-        u, v, w = (aimed[a + 3].take(ray).view(np.float32) for a in range(3))
-        # |(c - o) x d| <= h x |d|, component by component.
-        p, q, r = y * w, z * u, x * v
-        z *= v
-        p -= z
-        x *= w
-        q -= x
-        y *= u
-        r -= y
-        for a in (p, q, r, u, v, w):
-            np.abs(a, out=a)
-        for half, limits in ((0, ((q, w), (r, v))), (1, ((p, w), (r, u))), (2, ((p, v), (q, u)))):
-            h = self.lines[3 + half].take(place).view(np.float32)
-            for distance, speed in limits:
-                np.multiply(h, speed, out=x)
-                distance -= x
-        np.maximum(p, q, out=p)
-        np.maximum(p, r, out=p)
-        return np.flatnonzero(p <= LOOSE)
+        axes, lines = aimed
+        if isinstance(axes, tuple):
+            boxes = [self.lines[k + half].take(place) for half in (0, 3) for k in axes]
+        else:
+            n, flat = self.lines.shape[1], self.lines.ravel()
+            places = [place + k.take(ray) * n for k in axes]
+            boxes = [flat[half * n :].take(at) for half in (0, 3) for at in places]
+        x, y, z, hx, hy, hz = (column.view(np.float32) for column in boxes)
+        px, py, sx, sy = (line.take(ray).view(np.float32) for line in lines)
+        met = None
+        for c, h, p, s in ((x, hx, px, sx), (y, hy, py, sy)):
+            # |c - p - s z| <= h + |s| hz
+            np.subtract(c, p, out=p)
+            np.multiply(s, z, out=c)
+            p -= c
+            np.abs(p, out=p)
+            np.abs(s, out=s)
+            s *= hz
+            h += s
+            inside = p <= h
+            met = inside if met is None else np.logical_and(met, inside, out=met)
+        return np.flatnonzero(met)
 
 
 class Sieve(Boxes):
@@ -105,7 +120,7 @@ class Sieve(Boxes):
     ----------
     first : ndarray, shape (lists + 1,)
         List k's boxes are in the lines first[k] .. first[k + 1] - 1; the last line is filled up with boxes that no ray meets.
-    lines : list of 6 ndarray, complex128
+    lines : ndarray, shape (6, lines), complex128
         As those of :class:`Boxes`, four boxes each.
     items : ndarray
         The primitives, four a line.
@@ -123,11 +138,11 @@ class Sieve(Boxes):
         n = 4 * int(self.first[-1])
         self.items = np.zeros(n, lists.items.dtype)
         self.items[slot] = lists.items
-        for k, values in enumerate(self.lines):
-            # No line is at a distance of NaN.
-            line = np.full(n, np.nan if k < 3 else 0.0, np.float32)
+        # No ray is less than NaN away.
+        lines = np.full((6, n), np.nan, np.float32)
+        for line, values in zip(lines, self.lines):
             line[slot] = values.take(lists.items)
-            self.lines[k] = line.view(self.LINE)
+        self.lines = lines.view(self.LINE)
 
     @property
     def nbytes(self):

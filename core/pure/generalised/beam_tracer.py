@@ -1,7 +1,7 @@
 """Pictures from beams: every pixel is the sum, by area, of the fragments that lie in it.
 
-What of a surface is seen in a pixel has the shading of its centre; what of it is lit by a light has the highlight of the
-lit part's centre. Visibility, mirrors and the shadows of lights without extent are exact, refraction is paraxial. The
+What of a surface is seen in a pixel has the colour of its centre; what of it is lit by a light is shaded at four points,
+which is exact up to the third order. Visibility, mirrors and the shadows of lights without extent are exact, refraction is paraxial. The
 rest is sampled by rays, several a pixel: what lies beyond the boxes around primitives that are no polygons, what is seen
 in smooth-shaded (curved) mirrors and in glass at grazing angles, soft shadows, and light that has come through glass.
 """
@@ -15,6 +15,7 @@ from ..tracing.camera import through
 from ..tracing.secondary import mirrored_and_refracted
 from ..tracing.vectors import add, dot, minus, mul, times
 from ..tracing.whitted import KINDS, PRIMARY, REFLECTED, REFRACTED, TRANSPARENT, Path, Whitted
+from . import clipping
 from .beam_clip import in_pixels
 from .beam_space import height
 from .beam_tree import share
@@ -37,7 +38,8 @@ class Seen:
     first : tuple of 2 float
         Integral of x and y: `area` times the centre.
     lit : dict
-        Number of a light -> area and integral of what it shines on.
+        Number of a light -> of what it shines on the area, the integrals of x and y, and, seen from the pixel's corner,
+        those of x x, x y and y y.
     """
 
     beam: object
@@ -164,11 +166,11 @@ class BeamTracer(Whitted):
                     if depth > deepest.get((x, y), -math.inf):
                         deepest[x, y], middle[x, y] = depth, f
         for f, light, points in self.lit_parts:
-            for x, y, area, centre, _ in in_pixels(points, region):
+            for x, y, area, centre, part in in_pixels(points, region):
                 own = seen.get((x, y), {}).get((id(f.beam), f.surface))
                 if own:
-                    a, mx, my = own.lit.get(light, (0.0, 0.0, 0.0))
-                    own.lit[light] = a + area, mx + area * centre[0], my + area * centre[1]
+                    more = area, area * centre[0], area * centre[1], *clipping.second_moments(part, (x, y))
+                    own.lit[light] = tuple(map(sum, zip(own.lit.get(light, (0.0,) * 6), more)))
         return seen, loose, middle
 
     def _pixel(self, x, y, seen, loose, middle):
@@ -176,7 +178,7 @@ class BeamTracer(Whitted):
         self.spent = dict.fromkeys(("rays_per_pixel", *(("n_it", "n_ts") if self.count else ())), 0)
         radiance = (0.0, 0.0, 0.0)
         for own in seen.values():
-            radiance = add(radiance, self._seen_of(own, self._key(x, y, own.beam, own.surface)))
+            radiance = add(radiance, self._seen_of(own, (x, y), self._key(x, y, own.beam, own.surface)))
         stack, places = [], self._points(x, y) if loose else []
         for own in loose.values():
             f, points = own.fragment, own.points(places)
@@ -206,7 +208,7 @@ class BeamTracer(Whitted):
         places = (scattered(False, k, SAMPLES, u, v) for k in range(SAMPLES))
         return [(x + 0.5 * (s + 1.0), y + 0.5 * (t + 1.0)) for s, t in places]
 
-    def _seen_of(self, own, key):
+    def _seen_of(self, own, corner, key):
         """What a pixel gets of a surface: emission, ambient light, and what the lights do; or of the sky."""
         tree, beam, area = self.tree, own.beam, own.area
         self.spent["rays_per_pixel"] += 1
@@ -221,10 +223,13 @@ class BeamTracer(Whitted):
         seen = times(area, add(seen, self._lit(surface, d, others, self._transmitted, key if self.soft else None)))
         for k, number in enumerate(self.hard):
             light = [self.lights[number]]
-            lit, mx, my = own.lit.get(k, (0.0, 0.0, 0.0))
+            lit, mx, my, *second = own.lit.get(k, (0.0,) * 6)
             if lit > 0.0:
-                _, at, d = tree.surface_at(beam, own.surface, (mx / lit, my / lit))
-                seen = add(seen, times(lit, self._lit(at, d, light, lambda *_: (1.0, 1.0, 1.0), None)))
+                x, y = mx / lit - corner[0], my / lit - corner[1]
+                spread = tuple(a / lit - b for a, b in zip(second, (x * x, x * y, y * y)))
+                for node in clipping.nodes((mx / lit, my / lit), spread):
+                    _, at, d = tree.surface_at(beam, own.surface, node)
+                    seen = add(seen, times(0.25 * lit, self._lit(at, d, light, lambda *_: (1.0, 1.0, 1.0), None)))
             rest = area - lit
             if rest > LEAST and (self.doubtful or k in tree.dark):
                 _, at, d = tree.surface_at(beam, own.surface, ((own.first[0] - mx) / rest, (own.first[1] - my) / rest))

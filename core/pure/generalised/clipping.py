@@ -77,6 +77,32 @@ def moments(polygon):
     return total, mx / 6.0 + total * x0, my / 6.0 + total * y0
 
 
+def second_moments(polygon, origin):
+    """Integrals of x x, x y and y y over a polygon in the plane, seen from an origin."""
+    corners = [(x - origin[0], y - origin[1]) for x, y in polygon]
+    (px, py), total = corners[0], (0.0, 0.0, 0.0)
+    for (qx, qy), (rx, ry) in zip(corners[1:], corners[2:]):
+        twice = (qx - px) * (ry - py) - (qy - py) * (rx - px)
+        x, y = px + qx + rx, py + qy + ry
+        own = x * x + px * px + qx * qx + rx * rx, x * y + px * py + qx * qy + rx * ry, y * y + py * py + qy * qy + ry * ry
+        total = tuple(t + twice * part / 24.0 for t, part in zip(total, own))
+    return total
+
+
+def nodes(centre, spread):
+    """Four points of equal weight at which a function's mean is that over a region, up to the function's third order.
+
+    `spread` are the region's means of x x, x y, y y, seen from its centre: the points are as far to either side along two
+    directions as makes their spread the region's.
+    """
+    (x, y), (xx, xy, yy) = centre, spread
+    a = math.sqrt(max(xx, 0.0))
+    b = xy / a if a > 0.0 else 0.0
+    c = math.sqrt(max(yy - b * b, 0.0))
+    root = math.sqrt(2.0)
+    return [(x + sign * e, y + sign * f) for e, f in ((root * a, root * b), (0.0, root * c)) for sign in (1.0, -1.0)]
+
+
 def moments_in_disc(polygon):
     """As :func:`moments`, of the part of a polygon inside the unit disc.
 

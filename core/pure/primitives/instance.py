@@ -6,7 +6,7 @@ from ...scene.layout import inverse, mirrors
 from ..query import Closest, Occluded
 from ..ray import EPSILON, Ray
 from . import Primitive, affine, box_common, box_overlaps
-from .triangle import Triangle, mesh_triangles
+from .triangle import Triangle, mesh_triangles, sized
 
 
 def instances_of(objects, which, build):
@@ -28,7 +28,7 @@ def instances_of(objects, which, build):
     for i in which:
         mesh = objects[i].geometry
         if id(mesh) not in inner:
-            inner[id(mesh)] = build(mesh_triangles(mesh, mesh.vertices, 0, False))
+            inner[id(mesh)] = build(sized(mesh_triangles(mesh, mesh.vertices, 0, False)))
         if inner[id(mesh)].primitives:
             instances.append(Instance(inner[id(mesh)], objects[i].matrix, i))
     return instances
