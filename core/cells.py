@@ -71,22 +71,37 @@ def cells_along(size, n, rule, density, resolution):
     return [max(1, int(s * along)) for s in shape]
 
 
-def too_many(name, cells, most, size, n, rule, density):
-    """The message that a grid of `cells` cells along the axes would not fit, with the resolution that would."""
-    fits = max(cells)
-    while fits > 1 and math.prod(cells_along(size, n, rule, density, fits)) > most:
-        fits = fits * 15 // 16
+def resolution_that_fits(fits, cells, size, n, rule, density):
+    """The largest resolution, from that of `cells` cells along the axes downwards in steps of a sixteenth, whose cells along the
+    axes satisfy `fits`; at least 1."""
+    along = max(cells)
+    while along > 1 and not fits(cells_along(size, n, rule, density, along)):
+        along = along * 15 // 16
+    return along
+
+
+def too_many(name, cells, most, fits):
+    """The message that a grid of `cells` cells along the axes would not fit; the resolution `fits` would."""
     return (
         f"{name}: {' x '.join(map(str, cells))} cells are more than the {most} that fit into memory. "
         f"Set resolution to {fits} or less."
     )
 
 
-def too_many_slabs(need, slabs):
-    """The message that lists of slabs would not fit."""
+def too_many_references(name, cells, most, fits):
+    """The message that the lists of `cells` cells along the axes would not fit; those at the resolution `fits` would."""
+    return (
+        f"{name}: {' x '.join(map(str, cells))} cells would hold more than {most} references to primitives, which is what fits into "
+        f"memory. Set resolution to {fits} or less."
+    )
+
+
+def too_many_slabs(need, slabs, intersect, fits):
+    """The message that lists of slabs would not fit; those at the resolution `fits` would."""
+    other = "Set intersect to sorted, or" if intersect == "bits" else "Set"
     return (
         f"separated-grid: lists of {' + '.join(map(str, slabs))} slabs would take {need / 2**30:.1f} GiB, more than half of the free "
-        f"memory. Set intersect to sorted, or resolution to {max(slabs) // 2} or less."
+        f"memory. {other} resolution to {fits} or less."
     )
 
 

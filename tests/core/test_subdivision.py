@@ -8,6 +8,7 @@ import pytest
 
 import rayscope.core.fast.subdivision.grid as fast_grid
 import rayscope.core.pure.subdivision.grid as pure_grid
+import rayscope.core.pure.subdivision.separated_grid as pure_separated_grid
 from rayscope.core import MemoryEstimateError, ParameterError, Scene, build, solids
 from rayscope.core.figures import PER_RAY
 from rayscope.core.fast.rays import Rays
@@ -181,6 +182,29 @@ def test_grid_too_large_is_refused_before_allocation(module, core, name, monkeyp
     assert 2 < fits < 40
     index = build(scene, name, core=core, resolution=fits)
     assert 0.5 * 1e6 / (24 if core == "fast" else 32) >= index.figures["N_E"] > 0.2 * 1e6 / 32
+
+
+@pytest.mark.parametrize("module, core", [(separated_grid, "fast"), (pure_separated_grid, "pure")])
+@pytest.mark.parametrize("more", [dict(), dict(intersect="sorted"), dict(axes=2)], ids=str)
+def test_slabs_too_many_are_refused_with_the_resolution_that_fits(module, core, more, monkeypatch):
+    scene = soup(2000 if core == "fast" else 200, 0.3)
+    monkeypatch.setattr(module, "free_memory", lambda: 1e6 if core == "fast" else 4e4)
+    with pytest.raises(MemoryEstimateError, match="slabs would take .* resolution to") as refusal:
+        build(scene, "separated-grid", core=core, resolution=4000, **more)
+    fits = int(str(refusal.value).split("resolution to ")[1].split()[0])
+    assert 2 < fits < 2000
+    build(scene, "separated-grid", core=core, resolution=fits, **more)
+    with pytest.raises(MemoryEstimateError):
+        build(scene, "separated-grid", core=core, resolution=fits * 5 // 4 + 1, **more)
+
+
+def test_references_too_many_are_refused_with_the_resolution_that_fits(monkeypatch):
+    scene = soup(1000, 1.0)
+    monkeypatch.setattr(fast_grid, "free_memory", lambda: 3e6)
+    with pytest.raises(MemoryEstimateError, match="references to primitives.*Set resolution to") as refusal:
+        build(scene, "grid", resolution=39)
+    fits = int(str(refusal.value).split("Set resolution to ")[1].split()[0])
+    assert 2 < fits < 35 and build(scene, "grid", resolution=fits).figures["N_ER"] > 1000
 
 
 def test_mailbox_saves_tests_and_nothing_else():

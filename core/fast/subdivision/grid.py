@@ -7,7 +7,7 @@ import math
 
 import numpy as np
 
-from ...cells import GRID_OVERLAP, cells_along, too_many
+from ...cells import GRID_OVERLAP, cells_along, resolution_that_fits, too_many, too_many_references
 from ...errors import MemoryEstimateError
 from ...hits import Cells, box_area
 from ...memory import free_memory
@@ -65,7 +65,7 @@ class Grid(Structure):
         self.resolution = np.array(cells_along(size, p.n, rule, density, resolution))
         if flat:
             self.resolution[np.argmin(self.resolution)] = 1
-        self._refuse_too_many(size, rule, density)
+        self._refuse_too_many(size)
         edges = ((hi - lo) / self.resolution)[self.resolution > 1]
         self.margin = max(
             GRID_OVERLAP * float(edges.min(initial=np.inf)) if len(edges) else 0.0,
@@ -76,24 +76,33 @@ class Grid(Structure):
         self.width = (self.hi - self.lo) / self.resolution
         self.stride = np.array([self.resolution[1] * self.resolution[2], self.resolution[2], 1])
 
-    def _refuse_too_many(self, size, rule, density):
+    def _refuse_too_many(self, size):
         """Raise before anything is allocated that would not fit into half of the free memory."""
         most = int(min(0.5 * free_memory() / CELL_BYTES, 2**31 - 1))
-        cells = math.prod(self.resolution.tolist())
-        if cells > most:
-            raise MemoryEstimateError(
-                too_many(self.NAME, self.resolution.tolist(), most, size, self.primitives.n, rule, density)
-            )
+        cells = self.resolution.tolist()
+        if math.prod(cells) > most:
+            raise MemoryEstimateError(too_many(self.NAME, cells, most, self._that_fits(lambda cells: math.prod(cells) <= most, size)))
+
+    def _that_fits(self, fits, size):
+        """The largest resolution with so many cells along the axes that they satisfy `fits`."""
+        rule, density = self.parameters["rule"], self.parameters["density"]
+        return resolution_that_fits(fits, self.resolution.tolist(), size, self.primitives.n, rule, density)
+
+    def _extent(self, resolution):
+        """How many cells along each axis the primitives' boxes reach into, shape (n, 3), and the first ones."""
+        p, width = self.primitives, (self.hi - self.lo) / resolution
+        first, last = (np.clip((x - self.lo) / width, 0, np.array(resolution) - 1).astype(np.int64)
+                       for x in (p.lo - self.margin, p.hi + self.margin))
+        return last - first + 1, first
 
     def _entries(self, progress):
         """Pairs (cell, item): which primitives reach into which cells."""
         p = self.primitives
-        first, last = self._index(p.lo - self.margin), self._index(p.hi + self.margin)
-        extent = last - first + 1
+        extent, first = self._extent(self.resolution)
         # A primitive is in one piece: where its box is one cell wide along two axes, it is in all of the row's cells.
         sure = (extent > 1).sum(axis=1) <= 1
         count = extent.prod(axis=1)
-        limit = 0.5 * free_memory() / REFERENCE_BYTES
+        limit = int(0.5 * free_memory() / REFERENCE_BYTES)
         cells, items, total = [], [], 0
         order = np.concatenate([np.flatnonzero(sure), np.flatnonzero(~sure)])
         ends = np.cumsum(count[order])
@@ -114,10 +123,8 @@ class Grid(Structure):
                 items.append(item)
                 total += len(cell)
             if total > limit:
-                raise MemoryEstimateError(
-                    f"{self.NAME}: {' x '.join(map(str, self.resolution))} cells would hold more than {int(limit)} references to "
-                    f"primitives, which is what fits. Set resolution to {int(self.resolution.max()) // 2} or less."
-                )
+                fits = self._that_fits(lambda cells: self._extent(cells)[0].prod(axis=1).sum() <= limit, (self.hi - self.lo).tolist())
+                raise MemoryEstimateError(too_many_references(self.NAME, self.resolution.tolist(), limit, fits))
             begin = end
             progress(begin / p.n)
         return np.concatenate(cells), np.concatenate(items)

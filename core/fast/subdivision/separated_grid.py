@@ -50,14 +50,11 @@ class SeparatedGrid(Grid):
         p = self.primitives
         self.regions = leaps.NoRegions()
         self.axes = [a for a in range(3) if axes == 3 or a != int(np.argmin(self.resolution))]
-        first, last = self._index(p.lo - self.margin), self._index(p.hi + self.margin)
-        extent = last - first + 1
-        slabs, references = self.resolution[self.axes], int(extent[:, self.axes].sum())
-        # The lists, and what is sorted while they are made.
-        need = int(slabs.sum()) * (p.n + 63) // 64 * 8 if intersect == "bits" else 8 * references
-        need += 24 * int(extent.sum(axis=0).max())
-        if need > 0.5 * free_memory():
-            raise MemoryEstimateError(too_many_slabs(need, slabs.tolist()))
+        extent, first = self._extent(self.resolution)
+        references, need = int(extent[:, self.axes].sum()), self._bytes(self.resolution)
+        if need > (most := 0.5 * free_memory()):
+            fits = self._that_fits(lambda cells: self._bytes(cells) <= most, (self.hi - self.lo).tolist())
+            raise MemoryEstimateError(too_many_slabs(need, self.resolution[self.axes].tolist(), intersect, fits))
         make = Bits if intersect == "bits" else Sorted
         self.order = along_curve(((0.5 * p.lo + 0.5 * p.hi - self.lo) / (0.5 * (self.hi - self.lo)) - 1.0).T)
         self.boxes = Boxes(p, self.margin)
@@ -77,6 +74,12 @@ class SeparatedGrid(Grid):
             memory=self.order.nbytes + self.boxes.nbytes + sum(s.nbytes for s in self.slabs),
         )
 
+    def _bytes(self, resolution):
+        """What the lists take, and what is sorted while they are made."""
+        extent = self._extent(resolution)[0].sum(axis=0)[self.axes]
+        words = (self.primitives.n + 63) // 64 * 8 * sum(resolution[a] for a in self.axes)
+        return int(24 * extent.max() + (words if self.parameters["intersect"] == "bits" else 8 * extent.sum()))
+
     def _surplus(self, first, extent):
         """References that intersecting lists adds to those of exact lists, as a part of these; from a sample of them."""
         ends = np.cumsum(extent.prod(axis=1))
@@ -92,7 +95,7 @@ class SeparatedGrid(Grid):
     def _slab_counts(self):
         return np.concatenate([s.count for s in self.slabs])
 
-    def _refuse_too_many(self, size, rule, density):
+    def _refuse_too_many(self, size):
         """Cells take no memory here."""
 
     def visits(self, query, rays, t_in):

@@ -7,7 +7,7 @@ import itertools
 import math
 
 from ...cell_shapes import groups_of
-from ...cells import GRID_OVERLAP, cells_along, too_many
+from ...cells import GRID_OVERLAP, cells_along, resolution_that_fits, too_many
 from ...errors import MemoryEstimateError
 from ...hits import Cells
 from ...memory import free_memory
@@ -50,20 +50,24 @@ class Grid(Structure):
         self.resolution = cells_along(size, len(primitives), rule, density, resolution)
         if flat:
             self.resolution[self.resolution.index(min(self.resolution))] = 1
-        self._refuse_too_many(size, rule, density)
+        self._refuse_too_many(size)
         edges = [(h - l) / n for l, h, n in zip(lo, hi, self.resolution) if n > 1]
         self.margin = max(GRID_OVERLAP * min(edges, default=0.0), 64.0 * EPSILON * max(map(abs, (*lo, *hi))), 1e-300)
         self.lo, self.hi = [x - self.margin for x in lo], [x + self.margin for x in hi]
         self.width = [(h - l) / n for l, h, n in zip(self.lo, self.hi, self.resolution)]
         self.mail = [None] * len(primitives)
 
-    def _refuse_too_many(self, size, rule, density):
+    def _refuse_too_many(self, size):
         """Raise before anything is allocated that would not fit into half of the free memory."""
         most = int(min(0.5 * free_memory() / CELL_BYTES, 2**31 - 1))
         if math.prod(self.resolution) > most:
-            raise MemoryEstimateError(
-                too_many(self.NAME, self.resolution, most, size, len(self.primitives), rule, density)
-            )
+            fits = self._that_fits(lambda cells: math.prod(cells) <= most, size)
+            raise MemoryEstimateError(too_many(self.NAME, self.resolution, most, fits))
+
+    def _that_fits(self, fits, size):
+        """The largest resolution with so many cells along the axes that they satisfy `fits`."""
+        rule, density = self.parameters["rule"], self.parameters["density"]
+        return resolution_that_fits(fits, self.resolution, size, len(self.primitives), rule, density)
 
     def _list(self, progress, lists):
         """Make the cells' lists, and fill in the figures."""

@@ -40,10 +40,11 @@ class SeparatedGrid(Grid):
         self._lay_out(rule, density, resolution, flat=axes == 2)
         n = len(self.primitives)
         self.axes = [a for a in range(3) if axes == 3 or a != self.resolution.index(min(self.resolution))]
-        slabs = [self.resolution[a] for a in self.axes]
-        need = sum(slabs) * (n // 8 + 32) if intersect == "bits" else 56 * sum(slabs) + 8 * len(slabs) * n
-        if need > 0.5 * free_memory():
-            raise MemoryEstimateError(too_many_slabs(need, slabs))
+        slabs, need = [self.resolution[a] for a in self.axes], self._bytes(self.resolution)
+        if need > (most := 0.5 * free_memory()):
+            size = [h - l for l, h in zip(self.lo, self.hi)]
+            fits = self._that_fits(lambda cells: self._bytes(cells) <= most, size)
+            raise MemoryEstimateError(too_many_slabs(need, slabs, intersect, fits))
         self.slabs = {a: [[] for _ in range(self.resolution[a])] for a in self.axes}
         for item, p in enumerate(self.primitives):
             for a in self.axes:
@@ -62,6 +63,11 @@ class SeparatedGrid(Grid):
             depth=1,
             memory=memory_of(self.slabs),
         )
+
+    def _bytes(self, resolution):
+        """What the lists take, primitives being in one slab an axis; bit vectors are made from lists."""
+        n, slabs = len(self.primitives), sum(resolution[a] for a in self.axes)
+        return slabs * (n // 8 + 32) if self.parameters["intersect"] == "bits" else 56 * slabs + 8 * len(self.axes) * n
 
     def _surplus(self):
         """References that intersecting lists adds to those of exact lists, as a part of these; from a sample of them."""
@@ -84,7 +90,7 @@ class SeparatedGrid(Grid):
             )
         return len(sample) / max(exact, 1) - 1.0
 
-    def _refuse_too_many(self, size, rule, density):
+    def _refuse_too_many(self, size):
         """Cells take no memory here."""
 
     def items_of(self, number, cell):
