@@ -449,7 +449,8 @@ def _examples(call, size):
 # --- stability --------------------------------------------------------------------------------------------------------
 
 def stability_options(sub):
-    sub.add_argument("--out", metavar="DIR", help="write tables, plots, and a file for each failing case there")
+    sub.add_argument("--out", metavar="DIR", help="write tables, plots, and a file for each failing case there; each case's rows as soon as it is done")
+    sub.add_argument("--resume", action="store_true", help="go on with the run in DIR that was stopped")
     sub.add_argument("--seconds", metavar="S", type=whole(1, 10**6), help="begin no case later than this")
     sub.add_argument("--techniques", metavar="A,B", help="only these")
     sub.add_argument("--cases", metavar="A,B", help="only these")
@@ -473,8 +474,11 @@ def stability_verb(call):
         technique(name)
     if call.out:
         report.folder(call.out)
+    elif call.resume:
+        raise ParameterError("--resume goes on with the run in a folder: say which one with --out DIR.")
     only = call.cases.split(",") if call.cases else None
-    result = stability.run(not call.small, call.seed, names, only, call.seconds, say=say)
+    kept = Path(call.out) / "cases.jsonl" if call.out else None
+    result = stability.run(not call.small, call.seed, names, only, call.seconds, say=say, kept=kept, resume=call.resume)
     asked = {"techniques": call.techniques, "cases": call.cases, "seconds": call.seconds, "small": call.small}
     record = report.record("stability", None, call.seed, asked, **result)
     text = [stability.text(result)]

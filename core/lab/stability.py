@@ -336,7 +336,46 @@ def takes(name, case):
     return technique(name).primitives == "all" or not case.kinds - {technique(name).primitives}
 
 
-def run(full=False, seed=0, names=None, only=None, seconds=None, timed=True, say=lambda line: None):
+class Kept:
+    """Cases that are done, in a file: one line each, so that a run which was stopped goes on where it was.
+
+    Parameters
+    ----------
+    path : path-like or None
+        None keeps nothing.
+    asked : dict
+        What the run was asked for; a file of another run is begun anew.
+    resume : bool
+        Take over what is in the file.
+    """
+
+    def __init__(self, path, asked, resume):
+        self.path, self.done = path and Path(path), {}
+        if path is None:
+            return
+        head = json.dumps({"run": asked})
+        lines = self.path.read_text(encoding="utf-8").splitlines(keepends=True) if resume and self.path.exists() else []
+        if lines and lines[0].strip() == head:
+            lines = [line for line in lines if line.endswith("\n")]      # the last may have been cut off
+            self.done = {record["case"]: record for record in map(json.loads, lines[1:])}
+        else:
+            lines = [head + "\n"]
+        self.path.write_text("".join(lines), encoding="utf-8")
+
+    def __call__(self, case, work):
+        """A case's record: the one in the file, or what `work(case)` returns, which goes there."""
+        if case.name not in self.done:
+            record = {"case": case.name, **work(case)}
+            if self.path is None:
+                return record
+            line = json.dumps(record, default=lambda x: x.item())
+            with self.path.open("a", encoding="utf-8") as file:
+                file.write(line + "\n")
+            self.done[case.name] = json.loads(line)
+        return self.done[case.name]
+
+
+def run(full=False, seed=0, names=None, only=None, seconds=None, timed=True, say=lambda line: None, kept=None, resume=False):
     """Run the suite.
 
     Parameters
@@ -351,7 +390,11 @@ def run(full=False, seed=0, names=None, only=None, seconds=None, timed=True, say
     timed : bool
         Also compare times.
     say : callable
-        Called with a line of text now and then.
+        Called with a line of text at each case: which one, how many there are, how long it may take.
+    kept : path-like, optional
+        File to which each case's rows go as soon as it is done.
+    resume : bool
+        Take over the cases that are in that file already, if they were asked for in the same way.
 
     Returns
     -------
@@ -370,28 +413,35 @@ def run(full=False, seed=0, names=None, only=None, seconds=None, timed=True, say
     unknown = set(only or ()) - set(names_of_cases)
     if unknown:
         raise SceneError(f"stability: there is no case {', '.join(sorted(unknown))}. Cases: {', '.join(names_of_cases)}.")
-    began, rows, truths, left_out, base = time.monotonic(), [], [], [], {}
+    began, rows, truths, drawn_rows, left_out, base, known, pace = time.monotonic(), [], [], [], [], {}, {}, {}
+    kept = Kept(kept, {"seed": seed, "full": full, "names": names and sorted(names), "timed": timed}, resume)
+    with_pictures = not only or any(c.name in only for c in drawn)
+    first = {"friendly", drawn[0].name if with_pictures else ""} if timed else set()            # what times are compared with
+    chosen = [c for c in (*everything, *drawn) if not only or c.name in only or c.name in first]
 
-    def to_do(some, friendly, first):
-        """The cases that are asked for, one after the other while there is time; the friendly one always, if times are compared."""
-        for k, case in enumerate(some, first):
-            if only and case.name not in only and not (friendly and case.name == friendly):
-                continue
-            if seconds is not None and time.monotonic() - began > seconds:
-                left_out.append(f"{case.name}: there was no time.")
-                continue
-            say(f"{case.name} ({k} of {len(names_of_cases)})")
-            yield case
+    def done(case):
+        """A case's record, if there is time for it."""
+        if seconds is not None and time.monotonic() - began > seconds:
+            left_out.append(f"{case.name}: there was no time.")
+            return None
+        if case.name not in kept.done:
+            now = chosen.index(case)
+            before = sum(c.name not in taken_over for c in chosen[:now])
+            gone = time.monotonic() - began
+            left = f", {gone / 60:.0f} minutes gone, {gone / max(before, 1) * (len(chosen) - now) / 60:.0f} left if cases take equally long" if gone > 60 else ""
+            say(f"{case.name} ({now + 1} of {len(chosen)}{left})")
+        return kept(case, rays_work if case in everything else pictures_work)
 
-    for case in to_do(everything, "friendly" if timed else "", 1):
+    def rays_work(case):
+        """The rows of a case with rays."""
         scene, batch = scene_and_rays(case, seed, RAYS[full])
         right = asked(batch, built(case, scene, "brute", "pure"))
-        truths.append(_truth_row(case, scene, batch, right, full))
+        record = {"truth": _truth_row(case, scene, batch, right, full), "rows": [], "left_out": []}
         for name, core in contestants(names):
             if core not in case.cores:
                 continue
             if not takes(name, case):
-                left_out.append(f"{case.name}: {name} takes only primitives of the kind {technique(name).primitives}.")
+                record["left_out"].append(f"{case.name}: {name} takes only primitives of the kind {technique(name).primitives}.")
                 continue
             try:
                 row = examine(case, scene, batch, right, name, core, seed, base.get((name, core)), timed)
@@ -400,13 +450,26 @@ def run(full=False, seed=0, names=None, only=None, seconds=None, timed=True, say
             except Exception as error:                                  # a technique that breaks is a finding, not our end
                 row = {"case": case.name, "technique": name, "core": core, "rays": len(batch), "bad": list(range(len(batch))),
                        "verdict": f"broke: {type(error).__name__}: {error}"}
-            if case.name == "friendly" and "seconds" in row:
-                base[name, core] = row
-            rows.append(row)
-    drawn_rows, known, pace = [], {}, {}
-    with_pictures = not only or any(c.name in only for c in drawn)
-    for case in to_do(drawn if with_pictures else (), drawn[0].name if timed else "", len(everything) + 1):
-        drawn_rows += stability_pictures.examined(case, seed, contestants(names), pace, known)
+            record["rows"].append(row)
+        return record
+
+    def pictures_work(case):
+        """The rows of a picture."""
+        return {"rows": stability_pictures.examined(case, seed, contestants(names), pace, known), "left_out": []}
+
+    taken_over = set(kept.done)
+    for case in chosen:
+        if (record := done(case)) is None:
+            continue
+        left_out += record["left_out"]
+        for row in record["rows"]:
+            if case.name in first and "seconds" in row:
+                (base if case in everything else pace)[row["technique"], row["core"]] = row
+        if case in everything:
+            truths.append(record["truth"])
+            rows += record["rows"]
+        else:
+            drawn_rows += record["rows"]
     failures = [r for r in rows + truths + drawn_rows if not r["verdict"].startswith(("ok", "refused"))]
     return {"rows": rows, "truth": truths, "pictures": drawn_rows, "left_out": left_out, "failures": failures, "failed": bool(failures), "seconds": time.monotonic() - began,
             "run": {"seed": seed, "full": full}}
@@ -675,13 +738,14 @@ def curves(path, lines, x, y, title):
     lines = {label: points for label, points in lines.items() if points}
     if not lines:
         return False
-    figure = report.figure_class()(figsize=(9, 5.5), layout="constrained")
+    many = len(lines) > 20
+    figure = report.figure_class()(figsize=(12, 6) if many else (9, 5.5), layout="constrained")
     axes = figure.add_subplot(xlabel=x, ylabel=y, title=title, xscale="log", yscale="log")
     for k, (label, points) in enumerate(lines.items()):
         axes.plot(*zip(*sorted(points)), marker="os^Dv<>pPX*h"[k % 12] if len(points) < 40 else None, color=f"C{k % 10}", label=label,
                   linestyle="-" if k < 10 else "--")
     axes.grid(True, which="both", alpha=0.25)
-    figure.legend(loc="outside right upper", frameon=False)
+    figure.legend(loc="outside right upper", frameon=False, ncols=2 if many else 1, fontsize="small" if many else "medium")
     figure.savefig(path, dpi=110)
     return True
 

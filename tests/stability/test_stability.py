@@ -198,7 +198,21 @@ def test_the_verb(tmp_path, monkeypatch, capsys):
     assert {r["case"] for r in record["rows"]} == {"friendly", "lost elsewhere", "scale 1e8"} and not record["failed"]
     assert {"table.txt", "table.csv", "exact.csv", "pictures.csv", "stability.json"} <= {p.name for p in tmp_path.iterdir()}
     assert {r["case"] for r in record["pictures"]} == {"friendly picture", "critical angle"}
-    assert main(["stability", "--cases", "no such"]) == 2
+    assert main(["stability", "--cases", "no such"]) == 2 == main(["stability", "--resume"])
+
+
+def test_a_run_that_was_stopped_goes_on(tmp_path, monkeypatch):
+    kept, asked, examine = tmp_path / "cases.jsonl", dict(names=["bvh"], only=["lost elsewhere", "critical angle"], kept=tmp_path / "cases.jsonl"), stability.examine
+    whole = stability.run(**asked)
+    kept.write_text("".join(kept.read_text().splitlines(keepends=True)[:2]) + '{"case": "lost else')   # stopped while it wrote
+    done, said = [], []
+    monkeypatch.setattr(stability, "examine", lambda case, *more: done.append(case.name) or examine(case, *more))
+    again = stability.run(**asked, resume=True, say=said.append)
+    assert done == ["lost elsewhere"] * 2 and said[0] == "lost elsewhere (2 of 4)"
+    same = lambda result: [(r["case"], r["technique"], r["core"], r["verdict"]) for k in ("rows", "truth", "pictures") for r in result[k]]
+    assert same(again) == same(whole) and len(same(again)) == 10
+    assert all(r["slow"] > 0.0 for r in again["rows"] if r["case"] != "friendly")                      # its time is known from the file
+    assert stability.run(**asked | {"names": ["grid"], "only": ["one"]}, resume=True)["rows"][0]["technique"] == "grid"
 
 
 @pytest.mark.parametrize("walk, most", [("exact", 2.0), ("add", 1000.0), ("subtract", 1000.0)])
