@@ -12,6 +12,7 @@ import rayscope.core.pure.subdivision.separated_grid as pure_separated_grid
 from rayscope.core import MemoryEstimateError, ParameterError, Scene, build, solids
 from rayscope.core.figures import PER_RAY
 from rayscope.core.fast.rays import Rays
+from rayscope.core.fast.subdivision.growth import Cells as GrowingCells
 from rayscope.core.fast.subdivision import leaps, separated_grid
 from rayscope.core.fast.subdivision.lists import Lists, PairSet, Recent
 from rayscope.core.fast.subdivision.sieve import Sieve
@@ -441,6 +442,36 @@ def test_surface_area_heuristic_and_clipping_pay():
     assert sah < 0.9 * middle, (sah, middle)
     loose = build(scene, "kd-tree", clip=False).figures["c_SAH"]
     assert sah < 0.9 * loose, (sah, loose)
+
+
+@pytest.mark.parametrize("cells, most", [(700, 9), (40, 70), (3, 400), (1, 5000)])
+def test_the_sweep_finds_the_cheapest_of_all_planes(cells, most):
+    """Many cells side by side, few, and one alone; boxes that begin and end at the same places, and in the cell's faces."""
+    rng = np.random.default_rng(cells)
+    tree, size, bonus = build(soup(10, 0.1), "kd-tree"), np.array([40, 100, 4000]), 0.2
+    count = rng.integers(most // 2, most, cells) + 1
+    lo = np.floor(rng.random((count.sum(), 3)) * 0.9 * size).astype(np.int32)
+    hi = np.minimum(lo + 1 + np.floor(rng.random((count.sum(), 3)) * 0.4 * size).astype(np.int32), size).astype(np.int32)
+    ends = [np.stack([2 * lo[:, a] + 1, 2 * hi[:, a]], axis=1).astype(np.int32).view(np.int64)[:, 0] for a in range(3)]
+    some = GrowingCells(np.zeros((cells, 3)), np.ones((cells, 3)), count, np.arange(count.sum()), tuple(ends))
+    bounds = np.zeros((cells, 3), np.int32), np.repeat(2 * size[None], cells, axis=0).astype(np.int32)
+    tree.tick = lambda: None
+    axis, end, cost = tree._cheapest(some, *bounds)
+    area, stop = 2.0 * (size * np.roll(size, 1)).sum(), np.cumsum(count)
+    for k, (first, last) in enumerate(zip(stop - count, stop)):
+        best = np.inf
+        for a in range(3):
+            own_lo, own_hi = lo[first:last, a], hi[first:last, a]
+            face, rim = size[a - 1] * size[a - 2], size[a - 1] + size[a - 2]
+            for begins, places in ((1, np.unique(own_lo)), (0, np.unique(own_hi))):
+                for q in places[(places > 0) & (places < size[a])]:
+                    left, right, at = (own_lo < q).sum(), (own_hi > q).sum(), q + 0.5 * begins
+                    c = 2.0 * (left * (face + rim * at) + right * (face + rim * (size[a] - at))) / area
+                    c *= 1.0 - bonus * (left == 0 or right == 0)
+                    best = min(best, c)
+                    if (a, 2 * q + begins) == (axis[k], end[k]):
+                        assert c == pytest.approx(cost[k] - 1.0, rel=1e-12)
+        assert best == pytest.approx(cost[k] - 1.0, rel=1e-12)
 
 
 @pytest.mark.parametrize("name", ["octree", "kd-tree", "bsp-tree"])

@@ -15,8 +15,10 @@ from . import growth
 from .box import EPSILON, through_box
 from .lists import Lists, Visits
 
-#: Rays whose stacks or intervals are kept at a time.
-RAYS = 16_384
+#: Rays whose stacks are kept at a time: so many that the last of them, who walk alone, cost little.
+RAYS = 65_536
+#: Rays whose intervals are kept at a time.
+PREPARED = 16_384
 
 
 class CellTree(Structure):
@@ -328,8 +330,8 @@ class Walk:
 
     def intervals(self, ray):
         """First all of a ray is cut into intervals, one a leaf; then they are walked."""
-        for start in range(0, len(ray), RAYS):
-            self._walk_intervals(*self._prepare(ray[start : start + RAYS]))
+        for start in range(0, len(ray), PREPARED):
+            self._walk_intervals(*self._prepare(ray[start : start + PREPARED]))
 
     def _prepare(self, ray):
         """The (ray, leaf) pairs of rays, in order along each ray, with their beginnings."""
