@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ..errors import SceneError
+from ..errors import Notice, SceneError
 from ..fast.primitives import Primitives
 from ..fast.primitives.triangle import Triangles
 from ..fast.rays import Rays
@@ -11,6 +11,9 @@ from ..scene.scene import Mesh
 
 #: Rounding of a float32 point, relative to its largest coordinate, with room for the few operations that make it.
 FLOAT32_SLACK = 2.0**-21
+
+#: Further from the origin, in sizes of the scene, float32 may lose hits; what it does to t is told.
+FAR = 1e5
 
 #: A hit before t_min is searched past this often; every search starts beyond what was found before.
 SEARCHES = 4
@@ -42,7 +45,20 @@ class Peer(Structure):
         index = cls(Primitives([Triangles.of(scene.objects, meshes)]), parameters, progress)
         index.scene, index.technique = scene, row
         del index.figures["memory"]
+        index.notices += index._far(row)
         return index
+
+    def _far(self, row):
+        """What float32 costs in a scene that is small and far from the origin."""
+        lo, hi = self.primitives.lo, self.primitives.hi
+        if not self.primitives.n:
+            return []
+        with np.errstate(over="ignore"):
+            size, far = float((hi.max(axis=0) - lo.min(axis=0)).max()), float(np.maximum(np.abs(lo), np.abs(hi)).max())
+        if far <= FAR * size:
+            return []
+        return [Notice(row.label, f"the scene lies {far:.3g} from the origin and measures {size:.3g}; in float32, which this calculates with, distances are wrong "
+                                  f"by about {2.0**-23 * far:.1g} there, and hits may be lost. Move the scene to the origin, or use a technique of Rayscope's own.")]
 
     def nearest(self, origins, directions, far):
         """The engine's own answer for rays from t = 0.

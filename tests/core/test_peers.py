@@ -140,3 +140,12 @@ def test_unknown_figures_are_absent(name):
     index = build(soup(), name)
     assert "memory" not in index.figures and index.figures["N"] == 400 and index.figures["T_B"] > 0
     assert len(index.cells()) == 0
+
+
+def test_far_from_the_origin_it_is_told_what_float32_costs(name):
+    corners = np.random.default_rng(5).normal(size=(30, 3))
+    for offset, told in ((1e4, False), (1e7, True)):
+        index = build(Scene.from_triangles(corners + offset, np.arange(30).reshape(-1, 3)), name)
+        assert [n.text for n in index.notices if "wrong by about 1 there" in n.text] == [n.text for n in index.notices]
+        assert bool(index.notices) == told
+    assert not build(Scene(), name).notices
