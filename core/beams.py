@@ -5,6 +5,7 @@ import numpy as np
 from .errors import MemoryEstimateError, Notice
 from .hits import Cells
 from .memory import free_memory
+from .scene.faces import Faces
 
 #: Kinds of primitive that are made of flat faces; instances are those of meshes.
 SUPPORTED = ("triangle", "polygon", "instance")
@@ -14,6 +15,58 @@ BYTES = 2_000
 SAMPLES = 16
 #: Width in pixels of the picture that the overlay's tree is made for.
 WIDTH = 640
+
+
+class TooMany(Exception):
+    """A BSP tree would have more faces than it may."""
+
+
+class CastsBeams:
+    """Mixed into a core's Structure: the scene's faces, their BSP tree, and trees of beams.
+
+    Attributes
+    ----------
+    Bsp, BeamTree, Surfaces : type
+        The core's.
+    """
+
+    SUPPORTED = SUPPORTED
+    Bsp = BeamTree = Surfaces = None
+    _faces = _bsp = None
+
+    def prepare(self, check):
+        """The faces of the scene, and their BSP tree: None where it would be too large. Made once."""
+        most = self.parameters["max_fragments"]
+        if self._faces is None:
+            check_memory(most)
+            faces = Faces.of(self.scene.objects, self.scene.camera.frame()[0])
+            try:
+                if len(faces) > most:
+                    raise TooMany
+                self._bsp = self.Bsp(faces, most, check)
+                self.figures["memory"] += self._bsp.nbytes
+            except TooMany:
+                self.notices.append(faces_notice(len(faces), most))
+            self._faces = faces
+        return self._faces, self._bsp
+
+    def tree(self, size, depth, check=lambda: None, surfaces=None, **more):
+        """The beam tree of the camera's picture.
+
+        Parameters
+        ----------
+        size : (int, int)
+        depth : int
+            Reflections and refractions in a row, at most.
+        check : callable
+            Called now and then; may raise Cancelled.
+        surfaces : Surfaces, optional
+        **more
+            Lights and threshold; see the core's BeamTree.
+        """
+        faces, bsp = self.prepare(check)
+        surfaces, most = surfaces or self.Surfaces(self.scene), self.parameters["max_fragments"]
+        return self.BeamTree(self.scene, faces, bsp, surfaces, size, depth, most, check, **more)
 
 
 def check_memory(most):

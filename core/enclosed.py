@@ -1,9 +1,12 @@
 """Lights that stand inside something: they light nothing that is seen, whatever technique looks for shadows."""
 
+from .catalogue import build
 from .errors import Notice
 
 #: Lights that are looked at, at most.
 MOST = 100
+#: Rays times primitives, at most, that are tested one by one sooner than a structure is built for so few rays.
+TESTS = 20_000_000
 AXES = ((1.0, 0.0, 0.0), (-1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, -1.0, 0.0), (0.0, 0.0, 1.0), (0.0, 0.0, -1.0))
 
 
@@ -28,6 +31,8 @@ def enclosed(index, scene):
     places = [tuple(map(float, light.position)) for light in lights]
     eye = tuple(float(scene.camera.matrix[row][3]) for row in range(3))
     origins = [place for place in (eye, *places) for _ in AXES]
+    if getattr(index, "is_alone", False) and len(origins) * index.figures["N"] <= TESTS:
+        index = build(scene, "brute", index.core, beside=index)
     hits = index.closest(origins, list(AXES) * (len(places) + 1))
     around = []
     for first in range(0, len(origins), len(AXES)):

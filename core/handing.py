@@ -53,6 +53,11 @@ class HandingOver:
         return technique(SECOND).load(cls.core)(primitives, cls._second_parameters(), progress)
 
     @property
+    def is_alone(self):
+        """Whether the second structure has not been built."""
+        return self._second is None
+
+    @property
     def second(self):
         """The structure for all other rays."""
         if self._second is None:

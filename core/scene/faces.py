@@ -4,10 +4,12 @@ Triangles and planar polygons are flat: a polygon that is not convex becomes tri
 pieces. All other primitives are hidden in boxes: what is seen of a box must be found out in another way.
 """
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
 
+from .ears import area, ears, flattened, turn
 from .layout import Layout, mirrors, to_world
 from .solids import Corners, bounds, place
 
@@ -153,7 +155,7 @@ def _of_polygons(placed):
 
 
 def convex_pieces(corners, normal):
-    """A planar polygon as convex ones of at most CORNERS corners, by cutting off ears (Meisters 1975).
+    """A planar polygon as convex ones of at most CORNERS corners: as it is, or its ears.
 
     Parameters
     ----------
@@ -164,56 +166,23 @@ def convex_pieces(corners, normal):
     -------
     list of ndarray, shape (c, 3)
     """
-    drop = int(np.abs(normal).argmax())
-    flat = corners[:, [(drop + 1) % 3, (drop + 2) % 3]]
+    flat = flattened(corners, normal)
     # Corners at the same place as the one before say nothing.
-    keep = [i for i in range(len(flat)) if (flat[i] != flat[i - 1]).any()]
-    area = sum(_turn(flat[keep[0]], flat[i], flat[j]) for i, j in zip(keep, keep[1:]))
-    sign = 1.0 if area > 0.0 else -1.0
-    turns = [sign * _turn(flat[keep[i - 1]], flat[keep[i]], flat[keep[(i + 1) % len(keep)]]) for i in range(len(keep))]
-    slack = 1e-12 * abs(area)
-    if min(turns) >= -slack:
-        # Turning one way is not enough: a star does too, several times around.
-        step = np.diff(np.append(flat[keep], flat[keep[:1]], axis=0), axis=0)
-        angle = np.arctan2(step[:, 1], step[:, 0])
-        around = np.diff(np.append(angle, angle[0]))
-        around = np.where(around > np.pi, around - 2.0 * np.pi, np.where(around <= -np.pi, around + 2.0 * np.pi, around))
-        if abs(abs(around.sum()) - 2.0 * np.pi) < 1e-6:
-            return [corners[keep[:1] + keep[a:a + CORNERS - 1]] for a in range(1, len(keep) - 1, CORNERS - 2)]
-    ears, good = [], [_ear(flat, keep, i, sign) for i in range(len(keep))]
-    while len(keep) > 3:
-        best = max(range(len(keep)), key=good.__getitem__)
-        if not good[best][0]:
-            # What stood in the way of an ear may be gone.
-            good = [_ear(flat, keep, i, sign) for i in range(len(keep))]
-            best = max(range(len(keep)), key=good.__getitem__)
-        ears.append(corners[[keep[best - 1], keep[best], keep[(best + 1) % len(keep)]]])
-        del keep[best], good[best]
-        for i in (best - 1, best % len(keep)):
-            good[i] = _ear(flat, keep, i, sign)
-    ears.append(corners[keep])
-    return ears
+    keep = [i for i in range(len(flat)) if flat[i] != flat[i - 1]]
+    if len(keep) >= 3 and _is_convex([flat[i] for i in keep]):
+        return [corners[keep[:1] + keep[a:a + CORNERS - 1]] for a in range(1, len(keep) - 1, CORNERS - 2)]
+    return [corners[list(ear)] for ear in ears(flat)]
 
 
-def _turn(a, b, c):
-    """Twice the signed area of a triangle."""
-    return float((b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]))
-
-
-def _ear(flat, keep, i, sign):
-    """How good an ear a corner is: first whether it is one, then how far it is from being a sliver."""
-    a, b, c = (flat[keep[k % len(keep)]] for k in (i - 1, i, i + 1))
-    area = sign * _turn(a, b, c)
-    longest = max(float(((p - q) ** 2).sum()) for p, q in ((a, b), (b, c), (c, a)))
-    if area <= 0.0:
-        # A corner where the outline turns back upon itself, or goes straight on, can go; a reflex one cannot.
-        return (1, 0.0) if area == 0.0 else (0, area)
-    x, y = flat[keep].T
-    blocks = np.ones(len(keep), bool)
-    for p, q in ((a, b), (b, c), (c, a)):
-        blocks &= sign * ((q[0] - p[0]) * (y - p[1]) - (q[1] - p[1]) * (x - p[0])) >= 0.0
-        blocks &= (x != p[0]) | (y != p[1])
-    return (0, -area) if blocks.any() else (1, area / longest)
+def _is_convex(flat):
+    """Whether a polygon turns one way only, and once around; a star turns one way too, several times around."""
+    n, whole = len(flat), area(flat)
+    sign = 1.0 if whole > 0.0 else -1.0
+    if min(sign * turn(flat[i - 1], flat[i], flat[(i + 1) % n]) for i in range(n)) < -1e-12 * abs(whole):
+        return False
+    angle = [math.atan2(flat[i][1] - flat[i - 1][1], flat[i][0] - flat[i - 1][0]) for i in range(n)]
+    around = sum(math.remainder(angle[i] - angle[i - 1], 2.0 * math.pi) for i in range(n))
+    return abs(abs(around) - 2.0 * math.pi) < 1e-6
 
 
 def _box(obj, solid):

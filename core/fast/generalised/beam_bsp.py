@@ -7,7 +7,9 @@ by level, all nodes of a level at once.
 
 import numpy as np
 
-from .beam_clip import cut, joined, sides
+from ...beams import TooMany
+from .beam_clip import joined
+from .clipping import cut, sides
 
 #: Planes of faces that are tried in a node.
 CANDIDATES = 8
@@ -15,10 +17,6 @@ CANDIDATES = 8
 CUT = 4
 #: Corners nearer to a plane than this, relative to their coordinates and its distance, lie in it.
 TOLERANCE = 2.0**-40
-
-
-class TooMany(Exception):
-    """Cutting makes more faces than there may be."""
 
 
 class Bsp:

@@ -1,8 +1,7 @@
-"""Convex polygons by the thousand: cutting them by lines and planes, their areas and centres, the pixels they cover.
+"""Convex polygons by the thousand, as beams need them: their centres, and the pixels that they cover.
 
 n polygons are an array of points, shape (n, v, k) with k coordinates, and how many of them are in use, shape (n,); the
-rest repeats the first. A cut gives both sides the same two points, so areas are conserved to their last digits; what
-is narrower than a tolerance is not cut off but stays with its neighbour.
+rest repeats the first.
 """
 
 import numpy as np
@@ -26,56 +25,6 @@ def widened(points, width):
     if points.shape[1] >= width:
         return points
     return np.concatenate([points, np.repeat(points[:, :1], width - points.shape[1], axis=1)], axis=1)
-
-
-def sides(distance, tolerance):
-    """-1, 0 or 1 for corners beyond, on and before a line."""
-    return (distance > tolerance).astype(np.int8) - (distance < -tolerance)
-
-
-def cut(points, count, distance, side):
-    """Cut polygons that have corners on both sides.
-
-    Parameters
-    ----------
-    points : ndarray, shape (n, v, k)
-    count : ndarray, shape (n,)
-    distance : ndarray, shape (n, v)
-        Of the corners from the line or plane.
-    side : ndarray, shape (n, v)
-        See :func:`sides`.
-
-    Returns
-    -------
-    (points, count), (points, count)
-        The parts where the distance is positive, and where it is negative.
-    """
-    n, v, k = points.shape
-    live = np.arange(v) < count[:, None]
-    after = np.concatenate([np.arange(1, v), [0]])
-    row, place = np.nonzero(live & (side * side[:, after] < 0))
-    # From the nearer end: neighbours find the same point, and the other may be very far away.
-    first, second = row * v + place, row * v + after[place]
-    flat, corners = distance.ravel(), points.reshape(-1, k)
-    turned = np.abs(flat[first]) > np.abs(flat[second])
-    near, far = np.where(turned, second, first), np.where(turned, first, second)
-    d0, a = flat[near], corners[near]
-    new = a + (d0 / (d0 - flat[far]))[:, None] * (corners[far] - a)
-    crossing = np.zeros((n, v), np.int8)
-    crossing[row, place] = 1
-    parts = []
-    for keep in (live & (side >= 0), live & (side <= 0)):
-        ends = np.cumsum(keep + crossing, axis=1, dtype=np.int64)
-        total = ends[:, -1]
-        width = int(total.max(initial=1))
-        # Where each corner of the parts comes from: at first from the old ones, then from the new; what is spare, as the first.
-        source = np.zeros((n, width), np.int64)
-        mine, own = np.nonzero(keep)
-        source[mine, ends[mine, own] - crossing[mine, own] - 1] = mine * v + own
-        source[row, ends[row, place] - 1] = n * v + np.arange(len(row))
-        source = np.where(np.arange(width) < total[:, None], source, source[:, :1])
-        parts.append((np.concatenate([corners, new])[source], total))
-    return parts
 
 
 def areas(points):

@@ -10,7 +10,8 @@ what is left of its walk.
 import numpy as np
 
 from .beam_bsp import heights
-from .beam_clip import boxes, cut, joined, sides, widened
+from .beam_clip import boxes, joined, widened
+from .clipping import cut, sides
 
 #: Lines nearer than this to a corner, in pixels, pass through it.
 TOLERANCE = 1e-10

@@ -1,8 +1,8 @@
 """Clipping many convex polygons at once (Sutherland and Hodgman 1974), such that areas add up.
 
-A corner where an edge crosses a line is computed once, from the edge's positive end, and belongs to what lies on either
-side: the two parts of a polygon have its area, to rounding, and neighbours that share an edge share the cut. What lies
-on the line belongs to both sides, as a part without area.
+A corner where an edge crosses a line is computed once, from the nearer end, and belongs to what lies on either side: the
+two parts of a polygon have its area, to rounding, and neighbours that share an edge share the cut. What lies on the line
+belongs to both sides, as a part without area; what is nearer to it than a tolerance can be taken to lie on it.
 
 Polygons are arrays of corners, shape (n, k, d), counter-clockwise, with their numbers of corners, shape (n,); columns
 past a polygon's last corner repeat its first. The corners may be points of the plane (d = 2) or homogeneous (d = 3), or
@@ -15,8 +15,8 @@ import numpy as np
 SLIVER = 1e-15
 
 
-def sides(corners, lines):
-    """Which side of lines corners are on: positive, zero or negative; shape (n, k).
+def distances(corners, lines):
+    """How far corners are before lines, shape (n, k), in units of the lines' length; negative beyond.
 
     Parameters
     ----------
@@ -25,72 +25,75 @@ def sides(corners, lines):
         One each: sum of line * corner; with d + 1 columns the last is added.
     """
     d = corners.shape[2]
-    side = corners[:, :, 0] * lines[:, None, 0]
+    out = corners[:, :, 0] * lines[:, None, 0]
     for axis in range(1, d):
-        side += corners[:, :, axis] * lines[:, None, axis]
-    return side + lines[:, None, d] if lines.shape[1] > d else side
+        out += corners[:, :, axis] * lines[:, None, axis]
+    return out + lines[:, None, d] if lines.shape[1] > d else out
 
 
-def split(corners, count, lines):
-    """Divide each polygon by a line.
+def sides(distance, tolerance=0.0):
+    """-1, 0 or 1 for corners beyond, on and before a line."""
+    return (distance > tolerance).astype(np.int8) - (distance < -tolerance)
+
+
+def cut(points, count, distance, side, wanted=(1, -1)):
+    """Cut polygons by a line or plane each.
 
     Parameters
     ----------
-    corners : ndarray, shape (n, k, d)
+    points : ndarray, shape (n, v, k)
     count : ndarray, shape (n,)
-    lines : ndarray
+    distance : ndarray, shape (n, v)
+        Of the corners from the line or plane.
+    side : ndarray, shape (n, v)
         See :func:`sides`.
+    wanted : tuple of int
+        Which of the parts are made.
 
     Returns
     -------
-    inside, outside : (ndarray, ndarray)
-        Corners and their numbers, of the parts where the side is positive and negative. A number of 0: there is none.
+    list of (points, count)
+        The parts where the distance is positive, and where it is negative. A number of 0: there is none.
     """
-    side = sides(corners, lines)
-    crossing = _crossings(corners, side)
-    there = np.arange(corners.shape[1]) < count[:, None]
-    return tuple(_part(corners, there, sign * side, *crossing) for sign in (1.0, -1.0))
+    n, v, k = points.shape
+    live = np.arange(v) < count[:, None]
+    after = np.concatenate([np.arange(1, v), [0]])
+    row, place = np.nonzero(live & (side * side[:, after] < 0))
+    # From the nearer end: neighbours find the same point, and the other may be very far away.
+    first, second = row * v + place, row * v + after[place]
+    flat, corners = distance.ravel(), points.reshape(-1, k)
+    turned = np.abs(flat[first]) > np.abs(flat[second])
+    near, far = np.where(turned, second, first), np.where(turned, first, second)
+    d0, a = flat[near], corners[near]
+    new = a + (d0 / (d0 - flat[far]))[:, None] * (corners[far] - a)
+    crossing = np.zeros((n, v), np.int8)
+    crossing[row, place] = 1
+    parts = []
+    for sign in wanted:
+        # A line that only touches leaves no part.
+        keep = live & (sign * side >= 0) & (live & (sign * side > 0)).any(axis=1)[:, None]
+        ends = np.cumsum(keep + crossing, axis=1, dtype=np.int64)
+        total = ends[:, -1]
+        width = int(total.max(initial=1))
+        # Where each corner of the parts comes from: at first from the old ones, then from the new; what is spare, as the first.
+        source = np.zeros((n, width), np.int64)
+        mine, own = np.nonzero(keep)
+        source[mine, ends[mine, own] - crossing[mine, own] - 1] = mine * v + own
+        source[row, ends[row, place] - 1] = n * v + np.arange(len(row))
+        source = np.where(np.arange(width) < total[:, None], source, source[:, :1])
+        parts.append((np.concatenate([corners, new])[source], total))
+    return parts
+
+
+def split(corners, count, lines, wanted=(1, -1)):
+    """The parts of polygons where the distances from lines are positive and negative; see :func:`cut`."""
+    distance = distances(corners, lines)
+    return cut(corners, count, distance, sides(distance), wanted)
 
 
 def clip(corners, count, lines):
-    """The parts of polygons on the positive sides of lines; parameters as of :func:`split`."""
-    side = sides(corners, lines)
-    there = np.arange(corners.shape[1]) < count[:, None]
-    return _part(corners, there, side, *_crossings(corners, side))
-
-
-def _crossings(corners, side):
-    """Which edges cross the line, and where."""
-    after, side_after = np.roll(corners, -1, axis=1), np.roll(side, -1, axis=1)
-    down, up = (side > 0.0) & (side_after < 0.0), (side < 0.0) & (side_after > 0.0)
-    crosses = down | up
-    row, slot = np.nonzero(crosses)
-    a, b = corners[row, slot], after[row, slot]
-    s, t = side[row, slot], side_after[row, slot]
-    turned = up[row, slot]
-    a, b = np.where(turned[:, None], b, a), np.where(turned[:, None], a, b)
-    s, t = np.where(turned, t, s), np.where(turned, s, t)
-    point = np.zeros_like(corners)
-    point[row, slot] = a + (s / (s - t))[:, None] * (b - a)
-    return crosses, point
-
-
-def _part(corners, there, side, crosses, point):
-    """The parts with side >= 0: corners and their numbers."""
-    n, k, d = corners.shape
-    kept = there & (side >= 0.0)
-    # A line that only touches leaves no part.
-    kept &= (there & (side > 0.0)).any(axis=1)[:, None]
-    used = np.stack([kept, crosses], axis=2).reshape(n, 2 * k)
-    both = np.stack([corners, point], axis=2).reshape(n, 2 * k, d)
-    count = used.sum(axis=1)
-    out = np.zeros((n, max(int(count.max(initial=0)), 1), d))
-    row, slot = np.nonzero(used)
-    place = np.arange(len(row)) - np.repeat(np.cumsum(count) - count, count)
-    out[row, place] = both[row, slot]
-    padding = np.arange(out.shape[1]) >= count[:, None]
-    out[padding] = np.broadcast_to(out[:, :1], out.shape)[padding]
-    return out, count
+    """The parts of polygons before lines; see :func:`split`."""
+    return split(corners, count, lines, wanted=(1,))[0]
 
 
 def area(corners):
@@ -207,7 +210,7 @@ def subtract(corners, count, owner, lines, sliver=SLIVER):
     """
     apart = np.zeros(len(corners), bool)
     for k in range(lines.shape[1]):
-        apart |= lines[:, k].any(axis=1) & (sides(corners, lines[:, k]) <= 0.0).all(axis=1)
+        apart |= lines[:, k].any(axis=1) & (distances(corners, lines[:, k]) <= 0.0).all(axis=1)
     # What lies beyond a line is left whole, or the lines before it would cut it for nothing.
     whole, rest = np.flatnonzero(apart), np.flatnonzero(~apart)
     left = [(corners[whole], count[whole], owner[whole])]

@@ -6,7 +6,10 @@ Kedem and Naylor 1980), and, where these would make a chain of the tree, medians
 
 from dataclasses import dataclass, field, replace
 
-from .beam_clip import box, cut
+from ...beams import TooMany
+from ..structure import memory_of
+from .beam_clip import box
+from .clipping import cut
 from .beam_space import height
 
 #: Planes of faces that are tried in a node.
@@ -15,10 +18,6 @@ CANDIDATES = 8
 CUT = 4
 #: Corners nearer to a plane than this, relative to their coordinates and its distance, lie in it.
 TOLERANCE = 2.0**-40
-
-
-class TooMany(Exception):
-    """Cutting makes more faces than there may be."""
 
 
 @dataclass(slots=True)
@@ -96,6 +95,11 @@ class Bsp:
             if self.faces + waiting > most:
                 raise TooMany
             todo += [(lower, node, "below"), (upper, node, "above")]
+
+    @property
+    def nbytes(self):
+        """Bytes that it takes."""
+        return memory_of(self.root)
 
     def _divided(self, faces):
         """A node for faces, and those that go below and above it."""

@@ -1,51 +1,8 @@
-"""Convex polygons: cutting them by lines and planes, their areas and centres, the pixels they cover.
-
-A polygon is a list of points with two or three coordinates, counter-clockwise. A cut gives both sides the same two
-points, so areas are conserved to their last digits; what is narrower than a tolerance is not cut off but stays with its
-neighbour.
-"""
+"""Convex polygons as beams need them: their centres, and the pixels that they cover."""
 
 import math
 
 from .clipping import clip, moments
-
-
-def sides(distances, tolerance):
-    """-1, 0 or 1 for corners beyond, on and before a line."""
-    return [(d > tolerance) - (d < -tolerance) for d in distances]
-
-
-def cut(points, distances, side):
-    """Cut a polygon that has corners on both sides.
-
-    Parameters
-    ----------
-    points : list of tuple
-    distances : list of float
-        Of the corners from the line or plane.
-    side : list of int
-        See :func:`sides`.
-
-    Returns
-    -------
-    inside, outside : list of tuple
-        The parts where the distance is positive, and where it is negative.
-    """
-    inside, outside = [], []
-    for i, (p, s) in enumerate(zip(points, side)):
-        if s >= 0:
-            inside.append(p)
-        if s <= 0:
-            outside.append(p)
-        k = (i + 1) % len(points)
-        if s * side[k] < 0:
-            # From the nearer end: neighbours find the same point, and the other may be very far away.
-            near, far = (k, i) if abs(distances[i]) > abs(distances[k]) else (i, k)
-            share = distances[near] / (distances[near] - distances[far])
-            crossing = tuple(x + share * (y - x) for x, y in zip(points[near], points[far]))
-            inside.append(crossing)
-            outside.append(crossing)
-    return inside, outside
 
 
 def area_and_centre(points):

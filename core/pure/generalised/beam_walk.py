@@ -10,7 +10,8 @@ import math
 from dataclasses import dataclass
 
 from .beam_bsp import Node, sides_of
-from .beam_clip import box, cut, sides
+from .beam_clip import box
+from .clipping import cut, sides
 from .beam_space import height
 
 #: Lines nearer than this to a corner, in pixels, pass through it.

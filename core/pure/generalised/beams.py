@@ -7,22 +7,19 @@ approximation; lights cast beams for their shadows. Rays by themselves are hande
 
 from collections import Counter
 
-from ...beams import SUPPORTED, cells_of, check_memory, faces_notice, hidden_notices, picture_size
-from ...scene.faces import Faces
+from ...beams import CastsBeams, cells_of, hidden_notices, picture_size
 from ..directional.second import Handing
-from ..structure import memory_of
 from ..tracing.camera import through
 from ..tracing.surface import Surfaces
 from ..tracing.vectors import add
-from .beam_bsp import Bsp, TooMany
+from .beam_bsp import Bsp
 from .beam_tree import BeamTree
 
 
-class Beams(Handing):
+class Beams(CastsBeams, Handing):
     """The polygons of a scene, from which trees of beams are cast."""
 
-    SUPPORTED = SUPPORTED
-    _faces = _bsp = None
+    Bsp, BeamTree, Surfaces = Bsp, BeamTree, Surfaces
 
     def build(self, progress, max_fragments, levels):
         if getattr(self.scene, "camera", None) is None:
@@ -31,40 +28,6 @@ class Beams(Handing):
 
     def walk(self, query):
         self.hand_over(query)
-
-    def prepare(self, check):
-        """The faces of the scene, and their BSP tree: None where it would be too large. Made once."""
-        most = self.parameters["max_fragments"]
-        if self._faces is None:
-            check_memory(most)
-            faces = Faces.of(self.scene.objects, self.scene.camera.frame()[0])
-            try:
-                if len(faces) > most:
-                    raise TooMany
-                self._bsp = Bsp(faces, most, check)
-                self.figures["memory"] += memory_of(self._bsp.root)
-            except TooMany:
-                self.notices.append(faces_notice(len(faces), most))
-            self._faces = faces
-        return self._faces, self._bsp
-
-    def tree(self, size, depth, check=lambda: None, surfaces=None, **more):
-        """The beam tree of the camera's picture.
-
-        Parameters
-        ----------
-        size : (int, int)
-        depth : int
-            Reflections and refractions in a row, at most.
-        check : callable
-            Called now and then; may raise Cancelled.
-        surfaces : Surfaces, optional
-        **more
-            Lights and threshold; see :class:`BeamTree`.
-        """
-        faces, bsp = self.prepare(check)
-        surfaces = surfaces or Surfaces(self.scene)
-        return BeamTree(self.scene, faces, bsp, surfaces, size, depth, self.parameters["max_fragments"], check, **more)
 
     def cells(self):
         """The beam tree, as deep as the parameter `levels` says: a cell from each mirror, or the eye, to what is seen."""

@@ -1,8 +1,8 @@
 """Clipping convex polygons (Sutherland and Hodgman 1974), such that areas add up.
 
-A corner where an edge crosses a line is computed once, from the edge's positive end, and belongs to what lies on either
-side: the two parts of a polygon have its area, to rounding, and neighbours that share an edge share the cut. What lies
-on the line belongs to both sides, as a part without area.
+A corner where an edge crosses a line is computed once, from the nearer end, and belongs to what lies on either side: the
+two parts of a polygon have its area, to rounding, and neighbours that share an edge share the cut. What lies on the line
+belongs to both sides, as a part without area; what is nearer to it than a tolerance can be taken to lie on it.
 
 A polygon is a list of corners, counter-clockwise. The corners may be points of the plane or homogeneous, or points of
 space.
@@ -25,30 +25,49 @@ def side(corner, line):
     return total + line[len(corner)] if len(line) > len(corner) else total
 
 
-def split(polygon, line):
-    """Divide a polygon by a line.
+def sides(distances, tolerance=0.0):
+    """-1, 0 or 1 for corners beyond, on and before a line."""
+    return [(d > tolerance) - (d < -tolerance) for d in distances]
+
+
+def cut(points, distances, side):
+    """Cut a polygon by a line or plane.
+
+    Parameters
+    ----------
+    points : list of tuple
+    distances : list of float
+        Of the corners from the line or plane.
+    side : list of int
+        See :func:`sides`.
 
     Returns
     -------
-    inside, outside : list
-        The parts where the side is positive and negative; empty where there is none.
+    inside, outside : list of tuple
+        The parts where the distance is positive, and where it is negative; empty where there is none.
     """
-    sides = [side(p, line) for p in polygon]
     inside, outside = [], []
-    for i, (p, s) in enumerate(zip(polygon, sides)):
-        if s >= 0.0:
+    for i, (p, s) in enumerate(zip(points, side)):
+        if s >= 0:
             inside.append(p)
-        if s <= 0.0:
+        if s <= 0:
             outside.append(p)
-        q, t = polygon[(i + 1) % len(polygon)], sides[(i + 1) % len(polygon)]
-        if s > 0.0 > t or s < 0.0 < t:
-            a, b, sa, sb = (p, q, s, t) if s > 0.0 else (q, p, t, s)
-            share = sa / (sa - sb)
-            crossing = tuple(x + share * (y - x) for x, y in zip(a, b))
+        k = (i + 1) % len(points)
+        if s * side[k] < 0:
+            # From the nearer end: neighbours find the same point, and the other may be very far away.
+            near, far = (k, i) if abs(distances[i]) > abs(distances[k]) else (i, k)
+            share = distances[near] / (distances[near] - distances[far])
+            crossing = tuple(x + share * (y - x) for x, y in zip(points[near], points[far]))
             inside.append(crossing)
             outside.append(crossing)
     # A line that only touches leaves no part.
-    return inside if any(s > 0.0 for s in sides) else [], outside if any(s < 0.0 for s in sides) else []
+    return inside if 1 in side else [], outside if -1 in side else []
+
+
+def split(polygon, line):
+    """The parts of a polygon where the side of a line is positive and negative; see :func:`cut`."""
+    distances = [side(p, line) for p in polygon]
+    return cut(polygon, distances, sides(distances))
 
 
 def clip(polygon, line):
