@@ -23,6 +23,7 @@ import numpy as np
 
 from ..catalogue import build, technique, techniques
 from ..cells import cells_along
+from ..contest import START
 from ..errors import Cancelled, RayscopeError
 from ..options import AUTOMATIC, STANDARD
 from ..scene.camera import Camera
@@ -64,7 +65,7 @@ DOUBT, OTHERS = 8.0, 3
 #: Techniques that take so many times as long as the best at half the size are not compared at the full one.
 HOPELESS = 1.7
 #: Pictures are repeated to compare them until all took so long together; if they take LONG, twice only. Seconds.
-QUICK, LONG = 5.0, 30.0
+QUICK, LONG = 3.0, 30.0
 #: What the automatic choice may take more than the best fixed one, and than STANDARD.
 BARS = (0.15, 0.1)
 #: Databases of :func:`benchmark`, with size factors that give some hundred primitives.
@@ -425,11 +426,11 @@ def _fit(name, core, scenes, looked, sets, brute):
     fitted = {key: value for own in counts.values() for key, value in _followed(own).items()}
     if brute is None:
         ray, test = _not_negative(np.stack([np.ones_like(n_it), n_it], axis=1), seconds)
-        return Model(power(builds), fitted, (ray, test, 0.0), wave=float(np.median(waves)))
+        return Model(power(builds), fitted, (ray, test, 0.0), wave=median(waves))
     test = brute.ns[1]
     ray, step = _not_negative(np.stack([np.ones_like(n_ts), n_ts], axis=1) / seconds[:, None], 1.0 - test * n_it / seconds, relative=False)
     ratio = (ray + test * n_it + step * n_ts) / seconds
-    return Model(power(builds), fitted, (ray, test, step), power(lazies), row.rays == ("shadow",), wave=float(np.median(waves)),
+    return Model(power(builds), fitted, (ray, test, step), power(lazies), row.rays == ("shadow",), wave=median(waves),
                  off=float(np.exp(np.sqrt(np.mean(np.log(ratio) ** 2)))))
 
 
@@ -582,7 +583,8 @@ def contenders(choice, rows):
     of, found = {row["technique"]: row for row in rows}, {}
     for kind, name in choice.items():
         key = f"s {kind}"
-        own = sorted((row for row in rows if key in row and row[key] <= DOUBT * of[name][key] and row is not of[name]), key=lambda row: row[key])
+        own = [row for row in rows if key in row and row[key] <= DOUBT * of[name][key] and row is not of[name]]
+        own = sorted(own, key=lambda row: row[key]) if 0.5 * DOUBT * of[name][key] >= START else []     # there will be no trial
         found[kind] = [(row["technique"], 0.0 if row["technique"] == STANDARD else row["T_B"]) for row in (of[name], *own[:OTHERS])]
     return found
 

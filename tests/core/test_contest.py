@@ -148,3 +148,5 @@ def test_what_may_be_quicker_takes_part():
     assert needs.contenders({"primary": "bvh"}, rows) == {"primary": [("bvh", 0.0), ("grid", 0.05), ("kd-tree", 9.0), ("octree", 0.05)]}
     assert needs.contenders({"primary": "grid"}, rows)["primary"][:3] == [("grid", 0.05), ("kd-tree", 9.0), ("bvh", 0.0)]
     assert needs.contenders({"primary": "grid"}, [rows[1], rows[4]]) == {"primary": [("grid", 0.05)]}
+    quick = [row | {"s primary": 0.01 * row["s primary"]} for row in rows]
+    assert needs.contenders({"primary": "bvh"}, quick) == {"primary": [("bvh", 0.0)]}                    # too quick for a trial

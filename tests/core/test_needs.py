@@ -196,7 +196,9 @@ def test_plan_says_what_is_left_out():
     times = {item["what"]: item["cost"] for item in plan.left_out if item["what"] in {t.name for t in catalogue.techniques()}}
     assert times and all(re.search(r"\d s (to build|in all)", cost) for cost in times.values())
     assert all(re.search(r"[\d.]+ ms at least to import", left[what]["cost"]) for what in ("secondary rays", "textures", "analytic primitives and Booleans"))
-    assert set(plan.tried) == {"primary"} and plan.choice["primary"] not in plan.tried["primary"]
+    small, larger = (needs.plan(scene_of(), (side, side)) for side in (40, 4000))
+    assert small.tried == {"primary": []}
+    assert larger.tried["primary"] and larger.choice["primary"] not in larger.tried["primary"] and "on trial" in needs.text(larger)
     other = needs.plan(scene_of((Material("glass", transmission=1.0),), objects=[Object("ball", Shapes([solids.sphere((0, 0, 3), 1.0)]))]))
     assert not {"secondary rays", "refraction", "analytic primitives and Booleans"} & {item["what"] for item in other.left_out}
     assert set(other.choice) == {"primary", "secondary"}
@@ -276,6 +278,14 @@ def test_import_is_quick(said):
     code = "import numpy, time; t = time.process_time(); import rayscope.core; print(time.process_time() - t)"
     times = [float(said(code)) for _ in range(3)]
     assert min(times) < 0.1
+
+
+@pytest.mark.parametrize("name", ["bvh", "grid", "image-directory", "automatic"])
+def test_first_pictures_do_not_wait_for_numpy_ma(name, said):
+    """It takes a tenth of a second, and the first np.unique or np.median imports it."""
+    rest = "" if name in ("grid", "automatic", "bvh") else f"'bvh', primary='{name}', "
+    code = SCENE + f"trace(Scene([Object('mesh', mesh)], camera=camera), {rest or repr(name) + ', '}size=(16, 12))\nprint('numpy.ma' in sys.modules)"
+    assert said(code).split() == ["False"]
 
 
 def test_looking_imports_nothing(said):
