@@ -185,7 +185,8 @@ def test_fewer_rays_than_16_uniform_samples_for_the_same_error():
 
 @CORES
 @WAYS
-def test_stopping_keeps_what_is_done(core, way):
+def test_stopping_keeps_what_is_done(core, way, monkeypatch):
+    monkeypatch.setattr("rayscope.core.rendering.INTERVAL", 0.0)         # the picture may take less time than that
     calls = []
 
     def progress(fraction):
