@@ -6,7 +6,7 @@ Panels look here at every redraw, so numpy and the core load on first use, not w
 from ..core.errors import SceneError
 
 #: Larger scenes are looked through for warnings only when they are inspected: it takes a while.
-AT_EACH_BUILD = 200_000
+AT_EACH_RUN = 200_000
 
 _found = {}     # Blender scene's session_uid -> Inspection
 _warnings = {}  # Blender scene's session_uid -> list of Finding
@@ -18,7 +18,7 @@ def found_in(scene):
 
 
 def warnings_of(scene):
-    """Where a Blender scene's numbers leave little precision, as of its last build or inspection."""
+    """Where a Blender scene's numbers leave little precision, as of its last build, picture or inspection."""
     return _warnings.get(scene.session_uid, [])
 
 
@@ -30,7 +30,7 @@ def forget(uid=None):
 
 def warn(uid, scene):
     """Look a scene that was read through for warnings."""
-    if scene.n_primitives <= AT_EACH_BUILD:
+    if scene.n_primitives <= AT_EACH_RUN:
         from ..core.lab.inspect import warnings
         _warnings[uid] = warnings(scene)
 

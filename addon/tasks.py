@@ -103,7 +103,9 @@ class Trace:
         self.estimate = estimate(self.scene, self.choice["technique"], self.choice["core"], self.size, **self.options).check_memory()
 
     def __call__(self, progress, on_tile=None):
+        from . import inspection
         from ..core.rendering import Rendering
+        inspection.warn(self.uid, self.scene)
         rendering = Rendering(self.scene, size=self.size, region=self.region, progress=progress, **self.choice, **self.options)
         self.result = rendering.result
         for tile in rendering.tiles():

@@ -15,7 +15,7 @@ import numpy as np
 from ..catalogue import build
 from ..errors import SceneError
 from ..rendering import Rendering
-from ..scene.layout import Layout, to_world
+from ..scene.layout import Layout, object_bounds, to_world
 from ..scene.scene import Mesh, Object, Scene
 from . import report
 
@@ -539,7 +539,7 @@ def warnings(scene):
     """
     corners = own_corners(scene)
     found = []
-    boxes = {k: box_of(own) for k, own in enumerate(corners) if len(own)}
+    boxes = boxes_of(scene, corners)
     sizes = {k: float(np.linalg.norm(b[1] - b[0])) for k, b in boxes.items()}
     for k, (lo, hi) in boxes.items():
         far = float(np.abs([lo, hi]).max())
@@ -571,7 +571,20 @@ def warnings(scene):
                              + (" within the object" if len(some) == 1 else "") + ": which is seen depends on their order alone; glass and shadows may flicker",
                              "Edit Mode > Mesh > Merge > By Distance, and delete the doubled faces." if len(some) == 1 else "Move one of them a little, or delete the doubled faces.",
                              number))
-    return found
+    return merged(found)
+
+
+def boxes_of(scene, corners):
+    """Number of an object -> its world box; of instances and solids, too, which have no corners of their own."""
+    boxes = {k: box_of(own) for k, own in enumerate(corners) if len(own)}
+    others = {}
+    for k, o in enumerate(scene.objects):
+        if k not in boxes and len(o.geometry):
+            others.setdefault(id(o.geometry), []).append(k)
+    for numbers in others.values():                                         # together: the geometry is looked through once
+        lo, hi = object_bounds([scene.objects[k] for k in numbers])
+        boxes |= zip(numbers, zip(lo, hi))
+    return {k: box for k, box in boxes.items() if np.isfinite(box).all()}
 
 
 def _coincident(corners):

@@ -38,10 +38,13 @@ def test_building_warns(scene):
     cube.location.x = 1e7
     cube.scale.z = 0.0
     bpy.context.view_layer.update()
-    bpy.ops.rayscope.build()
-    warned = inspection.warnings_of(scene)
-    assert {"far from the origin", "zero scale"} <= {f.cause for f in warned} and findings.RAYSCOPE_PT_warnings.poll(bpy.context)
-    assert all("Cube" in f.objects for f in warned)
+    scene.render.resolution_x, scene.render.resolution_y = 12, 10
+    for run in (bpy.ops.rayscope.build, bpy.ops.rayscope.trace):
+        inspection.forget()
+        run()
+        warned = inspection.warnings_of(scene)
+        assert {"far from the origin", "zero scale"} <= {f.cause for f in warned} and findings.RAYSCOPE_PT_warnings.poll(bpy.context)
+        assert all("Cube" in f.objects for f in warned)
 
 
 def test_select(scene):

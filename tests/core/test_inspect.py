@@ -140,9 +140,19 @@ def test_warnings():
     assert found["coincident surfaces", "twice"].number == 5 and found["coincident surfaces", "far", "double"].number == len(mesh)
     assert not any("good" in key for key in found)
     assert all(f.text and f.remedy.endswith(".") for f in found.values())
+    solid = Scene([Object("far ball", Shapes([solids.sphere((1e7, 0, 0), 1.0)])), placed("good", mesh)])
+    assert ("far from the origin", "far ball") in {(f.cause, *f.objects) for f in inspecting.warnings(solid)}
     wide = Scene([placed("bolt", mesh, (0, 0, 0), 1e-4), placed("planet", mesh, (0, 0, 0), 1e4)])
     assert ("range of scale", "bolt", "planet") in {(f.cause, *f.objects) for f in inspecting.warnings(wide)}
     assert not inspecting.warnings(Scene([placed("good", mesh)])) and not inspecting.warnings(Scene())
+
+
+def test_instances_are_warned_of_once(monkeypatch):
+    mesh = ball(6)
+    scene = Scene([placed("tree", mesh, (0, 1e6 + 10 * k, 0)) for k in range(5)])
+    monkeypatch.setattr("rayscope.core.scene.layout.COPIES_AT_MOST", 10)
+    found = inspecting.warnings(scene)
+    assert [(f.cause, f.objects) for f in found] == [("far from the origin", ["tree"])] and "4 other instances" in found[0].text
 
 
 def test_errors_and_the_verb(tmp_path, capsys):
