@@ -1,19 +1,10 @@
-"""Adaptive antialiasing: more samples where the picture needs them. A sample once taken is used to the end.
-
-What is judged are displayed values: 0 to 1, brighter than white is white, with a gamma of 2 (see `shown`).
-"""
+"""Adaptive antialiasing in this core; see :mod:`~rayscope.core.adaptive`."""
 
 import numpy as np
 
+from ...adaptive import DEPTHS, FIRST, SPENT, Adaptive
 from . import sampling
 from .whitted import WAVE
-
-#: Corners whose depths differ by more than this ratio belong to different surfaces.
-DEPTHS = 1.1
-#: Samples of a pixel before its variance is judged, at least.
-FIRST = 4
-#: Passes that are sums over all rays of a pixel.
-SPENT = ("rays_per_pixel", "n_it", "n_ts")
 
 
 def shown(radiance):
@@ -21,50 +12,9 @@ def shown(radiance):
     return np.sqrt(np.clip(radiance, 0.0, 1.0))
 
 
-class Adaptive:
-    """Base of the two ways.
-
-    Parameters
-    ----------
-    tracer : Whitted
-    region : (int, int, int, int)
-        x0, y0, x1, y1.
-    threshold : float
-        Difference of displayed values that is put up with.
-    level : int
-        How fine: 4**level samples a pixel, at most.
-    samples : int
-        Samples a pixel to begin with, where that can be chosen.
-    """
-
-    def __init__(self, tracer, region, threshold, level, samples):
-        self.tracer, self.region, self.threshold, self.level, self.samples = tracer, region, threshold, level, samples
-
-    def parts(self, order):
-        """Trace.
-
-        Parameters
-        ----------
-        order : list of (int, int, int, int)
-            The tiles of the region.
-
-        Yields
-        ------
-        fraction : float
-            How much is done.
-        tile : (int, int, int, int)
-            What is better now.
-        values : dict
-            Pass -> values of the tile's pixels, as from :meth:`Whitted.tile`.
-        spent : (ndarray, dict)
-            Pixels, y * width + x, also more than once; pass -> what rays of those pixels have cost.
-        """
-        raise NotImplementedError
-
-    @staticmethod
-    def _take(values):
-        """Take what was spent out of what the tracer returned."""
-        return {name: values.pop(name) for name in SPENT if name in values}
+def taken(values):
+    """Take what was spent out of what the tracer returned."""
+    return {name: values.pop(name) for name in SPENT if name in values}
 
 
 class Corners(Adaptive):
@@ -101,7 +51,7 @@ class Corners(Adaptive):
         out = tracer.traced(np.ascontiguousarray(origins.T), np.ascontiguousarray(directions.T), key, True)
         values = np.column_stack([out["combined"], out["object_index"], out["depth"]])
         pixels = np.minimum(iy // self.side, y1 - 1) * tracer.size[0] + np.minimum(ix // self.side, x1 - 1)
-        return values, out, (pixels, self._take(out))
+        return values, out, (pixels, taken(out))
 
     def _first(self, x0, y0, x1, y1):
         """The lower left corners of a tile's pixels, and the others at the region's upper and right edge."""
@@ -172,10 +122,14 @@ class Corners(Adaptive):
 
 
 class Variance(Adaptive):
-    """Pixels get more samples until the standard error of their mean, as displayed, is below the threshold.
+    """Pixels get more samples as long as that makes the picture better by as much as elsewhere.
 
-    The samples are those of uniform sampling. A pixel's variance is the mean of that of the 3 x 3 pixels around it:
-    few samples of its own may all miss an edge, and to stop where they happen to agree would make a bias.
+    The samples are those of uniform sampling; with n of them a pixel gets as many again if its standard error, as
+    displayed, is above threshold * (n / FIRST)**(3/4). Then a sample more takes as much from the picture's squared error
+    everywhere (Neyman's allocation, 1934): stratified samples err less than their variance tells, as n**(-3/4).
+
+    The variance is the pixel's, or the mean of the 3 x 3 pixels around it, if that is more: few samples of its own may
+    all miss an edge, and to stop where they happen to agree would make a bias.
     """
 
     def parts(self, order):
@@ -200,22 +154,21 @@ class Variance(Adaptive):
                 for py, px, number in self._samples(n[part], more[part]):
                     pixels = (tile[1] + py) * self.tracer.size[0] + tile[0] + px
                     out = self.tracer.sampled(pixels, number)
-                    spent.append((pixels, self._take(out)))
+                    spent.append((pixels, taken(out)))
                     radiance = out.pop("combined")
                     np.add.at(total[part], (py, px), radiance)
                     np.add.at(squares[part], (py, px), radiance * radiance)
-                    first.update(out)
+                    begun = np.flatnonzero(number == 0)
+                    for name, value in out.items():
+                        first.setdefault(name, []).append(value[begun])
                 n[part] += more[part]
+                first = {name: np.concatenate(values) for name, values in first.items()}
                 first["combined"] = (total[part] / n[part][..., None]).reshape(-1, 3)
                 yield (turn + (i + 1) / len(order)) / rounds, tile, first, _joined(spent)
 
     @staticmethod
     def _samples(n, more):
-        """Pixels of a tile and numbers of their samples, in chunks; the very first samples of a tile by themselves."""
-        if not n.any():
-            py, px = (a.ravel() for a in np.mgrid[: n.shape[0], : n.shape[1]])
-            yield py, px, 0
-            n, more = n + 1, more - 1
+        """Pixels of a tile and numbers of their samples, in chunks."""
         py, px = np.nonzero(more)
         times = more[py, px]
         within = np.arange(times.sum()) - np.repeat(np.cumsum(times) - times, times)
@@ -225,13 +178,13 @@ class Variance(Adaptive):
             yield py[w], px[w], n[py[w], px[w]] + within[part]
 
     def _noisy(self, n, total, squares):
-        """Whose standard error is above the threshold."""
+        """Who is worth as many samples again."""
         mean = total / n[..., None]
         variance = np.maximum(squares / n[..., None] - mean * mean, 0.0) * (n / (n - 1))[..., None]
-        error = np.sqrt(_mean_of_9(variance) / n[..., None])
+        error = np.sqrt(np.maximum(variance, _mean_of_9(variance)) / n[..., None])
         # Either way: a pixel that is all white so far can only become darker.
         off = np.maximum(shown(mean + error) - shown(mean), shown(mean) - shown(mean - error))
-        return (off > self.threshold).any(axis=-1)
+        return (off > self.threshold * (n / FIRST)[..., None] ** 0.75).any(axis=-1)
 
 
 def _mean_of_9(a):

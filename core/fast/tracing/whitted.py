@@ -96,21 +96,23 @@ class Whitted(Tracer):
         if not isinstance(sample, range):
             return self.sampled(pixels, sample)
         n = len(sample)
-        out = self.sampled(np.tile(pixels, n), np.repeat(sample, len(pixels)))
-        out = {name: value.reshape(n, len(pixels), *value.shape[1:]).sum(axis=0) for name, value in out.items()}
-        out["combined"] /= n
-        return out
+        out = self.sampled(np.repeat(pixels, n), np.tile(sample, len(pixels)))
+        out = {name: value.reshape(len(pixels), n, *value.shape[1:]) for name, value in out.items()}
+        return {
+            name: value.mean(axis=1) if name == "combined" else value.sum(axis=1) if name in self.per_pixel else value[:, 0]
+            for name, value in out.items()
+        }
 
     def sampled(self, pixels, sample):
         """Samples of pixels y * width + x, which may occur more than once, and what :meth:`tile` returns of them.
 
-        `sample` is the number of the sample, for all or one each.
+        `sample` is the number of the sample, for all or one each; where one is 0, the passes of what is met come, too.
         """
         key = None
         if self.samples > 1 or self.soft or self.roulette:
             key = sampling.first_key(pixels, sample, self.seed, self.stratified)
         o, d = primary(self.scene.camera, self.size, pixels, key if self.samples > 1 else None)
-        return self.traced(o, d, key, not np.any(sample))
+        return self.traced(o, d, key, np.min(sample) == 0)
 
     def traced(self, o, d, key, first):
         """What primary rays see; `first`: with the passes of what they meet."""

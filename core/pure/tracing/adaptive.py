@@ -1,20 +1,11 @@
-"""Adaptive antialiasing: more samples where the picture needs them. A sample once taken is used to the end.
-
-What is judged are displayed values: 0 to 1, brighter than white is white, with a gamma of 2 (see `shown`).
-"""
+"""Adaptive antialiasing in this core; see :mod:`~rayscope.core.adaptive`."""
 
 import math
 
+from ...adaptive import DEPTHS, FIRST, SPENT, Adaptive
 from . import sampling
 from .camera import through
 from .vectors import add, mul, times
-
-#: Corners whose depths differ by more than this ratio belong to different surfaces.
-DEPTHS = 1.1
-#: Samples of a pixel before its variance is judged, at least.
-FIRST = 4
-#: Passes that are sums over all rays of a pixel.
-SPENT = ("rays_per_pixel", "n_it", "n_ts")
 
 
 def shown(radiance):
@@ -22,46 +13,12 @@ def shown(radiance):
     return math.sqrt(min(max(radiance, 0.0), 1.0))
 
 
-class Adaptive:
-    """Base of the two ways.
+class Counted(Adaptive):
+    """Adds up what was spent on pixels."""
 
-    Parameters
-    ----------
-    tracer : Whitted
-    region : (int, int, int, int)
-        x0, y0, x1, y1.
-    threshold : float
-        Difference of displayed values that is put up with.
-    level : int
-        How fine: 4**level samples a pixel, at most.
-    samples : int
-        Samples a pixel to begin with, where that can be chosen.
-    """
-
-    def __init__(self, tracer, region, threshold, level, samples):
-        self.tracer, self.region, self.threshold, self.level, self.samples = tracer, region, threshold, level, samples
+    def __init__(self, *arguments):
+        super().__init__(*arguments)
         self._forget()
-
-    def parts(self, order):
-        """Trace.
-
-        Parameters
-        ----------
-        order : list of (int, int, int, int)
-            The tiles of the region.
-
-        Yields
-        ------
-        fraction : float
-            How much is done.
-        tile : (int, int, int, int)
-            What is better now.
-        values : dict
-            Pass -> values of the tile's pixels, as from :meth:`Whitted.tile`.
-        spent : (list, dict)
-            Pixels, y * width + x, also more than once; pass -> what rays of those pixels have cost.
-        """
-        raise NotImplementedError
 
     def _forget(self):
         """Nothing is spent since."""
@@ -82,7 +39,7 @@ class Adaptive:
         return spent
 
 
-class Corners(Adaptive):
+class Corners(Counted):
     """Whitted's (1980): a pixel's corners are traced; where they differ it is divided into four squares, and so on.
 
     A square's colour is the mean of its corners'. Pixels are divided when their corners differ in displayed colour, in
@@ -151,11 +108,15 @@ class Corners(Adaptive):
         return whole_pixel and (len(set(things)) > 1 or max(depths) > DEPTHS * min(depths))
 
 
-class Variance(Adaptive):
-    """Pixels get more samples until the standard error of their mean, as displayed, is below the threshold.
+class Variance(Counted):
+    """Pixels get more samples as long as that makes the picture better by as much as elsewhere.
 
-    The samples are those of uniform sampling. A pixel's variance is the mean of that of the 3 x 3 pixels around it:
-    few samples of its own may all miss an edge, and to stop where they happen to agree would make a bias.
+    The samples are those of uniform sampling; with n of them a pixel gets as many again if its standard error, as
+    displayed, is above threshold * (n / FIRST)**(3/4). Then a sample more takes as much from the picture's squared error
+    everywhere (Neyman's allocation, 1934): stratified samples err less than their variance tells, as n**(-3/4).
+
+    The variance is the pixel's, or the mean of the 3 x 3 pixels around it, if that is more: few samples of its own may
+    all miss an edge, and to stop where they happen to agree would make a bias.
     """
 
     def parts(self, order):
@@ -201,15 +162,17 @@ class Variance(Adaptive):
         return tuple(max(s / n - (t / n) ** 2, 0.0) * (n / (n - 1)) for s, t in zip(squares, total))
 
     def _noisy(self, pixel, variances):
-        """Whether the standard error is above the threshold."""
+        """Whether it is worth as many samples again."""
         x, y = pixel
         near = [variances[p] for dy in (-1, 0, 1) for dx in (-1, 0, 1) if (p := (x + dx, y + dy)) in variances]
         n, total, _ = self.state[pixel]
         for channel in range(3):
             mean = total[channel] / n
-            error = math.sqrt(sum(v[channel] for v in near) / len(near) / n)
+            variance = max(variances[pixel][channel], sum(v[channel] for v in near) / len(near))
+            error = math.sqrt(variance / n)
             # Either way: a pixel that is all white so far can only become darker.
-            if max(shown(mean + error) - shown(mean), shown(mean) - shown(mean - error)) > self.threshold:
+            off = max(shown(mean + error) - shown(mean), shown(mean) - shown(mean - error))
+            if off > self.threshold * (n / FIRST) ** 0.75:
                 return True
         return False
 

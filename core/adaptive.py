@@ -1,0 +1,52 @@
+"""Adaptive antialiasing, as both cores do it: more samples where the picture needs them, and none taken in vain.
+
+What is judged are displayed values: 0 to 1, brighter than white is white, with a gamma of 2.
+"""
+
+#: Corners whose depths differ by more than this ratio belong to different surfaces.
+DEPTHS = 1.1
+#: Samples of a pixel before its error is judged, at least.
+FIRST = 4
+#: Passes that are sums over all rays of a pixel.
+SPENT = ("rays_per_pixel", "n_it", "n_ts")
+
+
+class Adaptive:
+    """Base of the ways.
+
+    Parameters
+    ----------
+    tracer : Whitted
+    region : (int, int, int, int)
+        x0, y0, x1, y1.
+    threshold : float
+        Difference of displayed values that is put up with.
+    level : int
+        How fine: 4**level samples a pixel, at most.
+    samples : int
+        Samples a pixel to begin with, where that can be chosen.
+    """
+
+    def __init__(self, tracer, region, threshold, level, samples):
+        self.tracer, self.region, self.threshold, self.level, self.samples = tracer, region, threshold, level, samples
+
+    def parts(self, order):
+        """Trace.
+
+        Parameters
+        ----------
+        order : list of (int, int, int, int)
+            The tiles of the region.
+
+        Yields
+        ------
+        fraction : float
+            How much is done.
+        tile : (int, int, int, int)
+            What is better now.
+        values : dict
+            Pass -> values of the tile's pixels, as from :meth:`Whitted.tile`.
+        spent : (sequence of int, dict)
+            Pixels, y * width + x, also more than once; pass -> what rays of those pixels have cost.
+        """
+        raise NotImplementedError
