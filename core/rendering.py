@@ -219,6 +219,8 @@ class Rendering:
         passes = _framebuffer(self.size, names)
         self.result = Result(passes["combined"], passes, notices=_notices(scene))
         self._build(wanted, index)
+        for structure in {id(s): s for s in self.result.structures.values()}.values():
+            self.result.notices += structure.notices
         # A structure for all kinds of ray has nothing to build for a question like this.
         serves_all = [s for s in self.result.structures.values() if s.technique.rays == ALL_RAYS]
         if "shadow" in self.result.structures:

@@ -5,7 +5,7 @@ what every technique has to find; and some cases say by themselves what must bec
 are none, rays spawned from a hit).
 
 Both cores test triangles in float64. The numpy core's hierarchies keep boxes in float32, rounded outwards: that costs
-tests, never hits. What is left in single precision is Embree, which the plots show beside.
+tests, never hits. What is left in single precision are the engines of others, which a table and the plots show beside.
 """
 
 import contextlib
@@ -40,8 +40,11 @@ NOISE = 0.02
 RAYS = {False: 36, True: 90}
 EXACT = {False: 16, True: 45}
 TIMED = {"pure": 24, "fast": 400}
+#: In float32: up to so many sizes from the origin no hit is lost, and t is off by so many 2^-23 of the largest coordinate at most.
+FAR32, T_BOUND32, SINGLE_RAYS = 1e5, 16.0, 500
 
 COLUMNS = ("case", "technique", "core", "rays", "wrong", "lost", "ghost", "leaks", "self_hits", "t_error", "slow", "work", "verdict")
+SINGLE_COLUMNS = ("case", "technique", "rays", "lost", "t_error", "t_error32", "warned", "verdict")
 TRUTH_COLUMNS = ("case", "rays", "lost", "ghost", "wrong", "leaks", "t_ulp", "t_relative", "t_error", "off_surface", "verdict")
 
 
@@ -400,7 +403,7 @@ def run(full=False, seed=0, names=None, only=None, seconds=None, timed=True, say
     -------
     dict
         rows : one a technique, core and case, with the keys COLUMNS. truth : one a case, with the keys TRUTH_COLUMNS.
-        pictures : one a technique, core and picture, with the keys of `stability_pictures`.
+        pictures : one a technique, core and picture, with the keys of `stability_pictures`. single : see :func:`single_precision`.
         left_out : list of str. failures : rows whose verdict is not ok. failed : bool. run : seed and full.
 
     Raises
@@ -470,8 +473,10 @@ def run(full=False, seed=0, names=None, only=None, seconds=None, timed=True, say
             rows += record["rows"]
         else:
             drawn_rows += record["rows"]
-    failures = [r for r in rows + truths + drawn_rows if not r["verdict"].startswith(("ok", "refused"))]
-    return {"rows": rows, "truth": truths, "pictures": drawn_rows, "left_out": left_out, "failures": failures, "failed": bool(failures), "seconds": time.monotonic() - began,
+    say("float32")
+    single = single_precision([c for c in chosen if c in everything], seed) if names is None else []
+    failures = [r for r in rows + truths + drawn_rows + single if not r["verdict"].startswith(("ok", "refused"))]
+    return {"rows": rows, "truth": truths, "pictures": drawn_rows, "single": single, "left_out": left_out, "failures": failures, "failed": bool(failures), "seconds": time.monotonic() - began,
             "run": {"seed": seed, "full": full}}
 
 
@@ -506,7 +511,9 @@ def text(result):
              report.table(sums, ("technique", "core", "cases", "rays", "wrong", "lost", "ghost", "leaks", "self_hits", "t_error", "slowest")), "",
              "Brute force against exact arithmetic:", "", report.table(result["truth"], TRUTH_COLUMNS), "",
              "Pictures, those that took longest by their work or failed:", "", report.table(_worst(result["pictures"]), stability_pictures.COLUMNS), "",
+             "Float32, against ours:", "", report.table(result["single"], SINGLE_COLUMNS), "",
              "t_error: of t, in 2^-52 max(|t|, size of the scene); 8 are allowed between techniques.",
+             f"t_error32: of t, in 2^-23 of the largest coordinate; up to {FAR32:g} sizes of the scene from the origin less than {T_BOUND32:g}, with no hit lost, are expected.",
              "off_surface: distance of the ray's point at t from the primitive, in 2^-52 of the largest coordinate, the ray's origin included.",
              "Both cores test triangles in float64; boxes in float32 (numpy core, hierarchies) are rounded outwards and lose nothing."]
     for row in result["failures"]:
@@ -622,6 +629,7 @@ def write(result, folder, say=lambda line: None):
     folder, files = report.folder(folder), []
     for name, content in (("table.txt", text(result) + "\n"), ("table.csv", report.to_csv(result["rows"], COLUMNS)),
                           ("exact.csv", report.to_csv(result["truth"], TRUTH_COLUMNS)),
+                          ("float32.csv", report.to_csv(result["single"], SINGLE_COLUMNS)),
                           ("pictures.csv", report.to_csv(result["pictures"], stability_pictures.COLUMNS))):
         (folder / name).write_text(content, encoding="utf-8")
         files.append(folder / name)
@@ -707,28 +715,45 @@ def drift(walk, cells=1000, rays=4, seed=0):
     return sorted(worst.items())
 
 
-def single_precision(seed, full):
-    """Embree's largest error of t on the sweeps of scale and distance, in units of EPSILON * max(|t|, size).
+def single_precision(chosen, seed):
+    """The engines of others, which calculate in float32, on the sweeps of scale and distance.
+
+    Parameters
+    ----------
+    chosen : sequence of Case
+    seed : int
 
     Returns
     -------
-    dict
-        (sweep, value) -> error; empty without embreex.
+    list of dict
+        With the keys SINGLE_COLUMNS, and `sweep`. t_error is in units of EPSILON * max(|t|, size of the scene), t_error32 in those of 2^-23 of
+        the largest coordinate. Up to FAR32 sizes from the origin nothing should be lost, nor t off by more than T_BOUND32 of these; of
+        what is further away there has to be a warning. An engine that is not installed has no rows.
     """
-    found = {}
-    for case in cases(full):
+    found = []
+    for case in chosen:
         if case.sweep is None or case.sweep[0] == "aspect":
             continue
-        scene, batch = scene_and_rays(case, seed, 24)
-        try:
-            index = build(scene, "embree")
-        except MissingPackageError:
-            return {}
-        right, got = asked(batch, built(case, scene, "brute", "pure")), asked(batch, index)
-        both = (right.primitive >= 0) & (got.primitive >= 0)
-        length = lengths(batch.d)
-        error = np.abs(got.t - right.t)[both] * length[both] / (EPSILON * np.maximum(right.t[both] * length[both], size_of(scene)))
-        found[case.sweep] = float(error.max()) if len(error) else math.nan
+        scene, batch = scene_and_rays(case, seed, SINGLE_RAYS)
+        right = asked(batch, built(case, scene, "bvh", "fast"))
+        far = float(np.abs(batch.o).max(initial=0.0))
+        for row in techniques():
+            if row.family != "peers":
+                continue
+            try:
+                index = build(scene, row.name)
+            except MissingPackageError:
+                continue
+            got, length = asked(batch, index), lengths(batch.d)
+            both = (right.primitive >= 0) & (got.primitive >= 0)
+            off, t = np.abs(got.t - right.t)[both] * length[both], right.t[both] * length[both]
+            new = {"case": case.name, "technique": row.name, "core": "fast", "rays": len(batch), "lost": int(((right.primitive >= 0) & (got.primitive < 0)).sum()),
+                   "t_error": float((off / (EPSILON * np.maximum(t, size_of(scene)))).max(initial=0.0)), "t_error32": float(off.max(initial=0.0) / (2.0**-23 * far)),
+                   "sweep": case.sweep, "warned": bool(index.notices), "bad": []}
+            near = case.sweep[0] == "scale" or case.sweep[1] <= FAR32
+            off = [f"{new['lost']} lost"] * (new["lost"] > 0) + [f"t off by {new['t_error32']:.3g}"] * (new["t_error32"] > T_BOUND32)
+            # What others lose is told; that we warn of it is ours.
+            found.append(new | {"verdict": "no warning" if not near and not new["warned"] else f"ok ({', '.join(off)})" if off else "ok"})
     return found
 
 
@@ -761,10 +786,11 @@ def plots(result, folder, say=lambda line: None):
     report.figure_class()
     files, points = [], {row["case"]: row["sweep"] for row in result["truth"] if row.get("sweep")}
     say("plots")
-    single = single_precision(**result["run"])
     for sweep, label in SWEEPS.items():
         error = {"brute force, float64": [(r["sweep"][1], r["t_error"]) for r in result["truth"] if r.get("sweep") and r["sweep"][0] == sweep]}
-        error["Embree, float32"] = [(value, e) for (name, value), e in single.items() if name == sweep]
+        for row in result["single"]:
+            if row["sweep"][0] == sweep and row["lost"] < row["rays"]:
+                error.setdefault(f"{technique(row['technique']).label}, float32", []).append((row["sweep"][1], row["t_error"]))
         slow = {}
         for row in result["rows"]:
             if points.get(row["case"], ("",))[0] == sweep and row.get("slow"):

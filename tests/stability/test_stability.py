@@ -196,9 +196,19 @@ def test_the_verb(tmp_path, monkeypatch, capsys):
     assert main(["stability", "--small", "--techniques", "bvh", "--cases", "lost elsewhere,scale 1e8,critical angle", "--out", str(tmp_path), "--json"]) == 0
     record = json.loads(capsys.readouterr().out)
     assert {r["case"] for r in record["rows"]} == {"friendly", "lost elsewhere", "scale 1e8"} and not record["failed"]
-    assert {"table.txt", "table.csv", "exact.csv", "pictures.csv", "stability.json"} <= {p.name for p in tmp_path.iterdir()}
+    assert {"table.txt", "table.csv", "exact.csv", "float32.csv", "pictures.csv", "stability.json"} <= {p.name for p in tmp_path.iterdir()}
     assert {r["case"] for r in record["pictures"]} == {"friendly picture", "critical angle"}
     assert main(["stability", "--cases", "no such"]) == 2 == main(["stability", "--resume"])
+
+
+def test_in_float32_nothing_is_lost_near_the_origin_and_what_is_far_away_is_warned_of():
+    pytest.importorskip("embreex")
+    rows = stability.single_precision([c for c in stress.cases(full=True) if c.name in ("distance 1e1", "distance 1e5", "distance 1e6", "distance 1e8")], 0)
+    found = {row["case"]: row for row in rows if row["technique"] == "embree"}
+    for name in ("distance 1e1", "distance 1e5"):
+        assert found[name]["lost"] == 0 and 0.01 < found[name]["t_error32"] <= stability.T_BOUND32 and not found[name]["warned"]
+    assert found["distance 1e6"]["warned"] and found["distance 1e8"]["warned"] and found["distance 1e8"]["lost"] > 0
+    assert all(row["verdict"].startswith("ok") for row in rows)
 
 
 def test_a_run_that_was_stopped_goes_on(tmp_path, monkeypatch):
