@@ -19,7 +19,7 @@ from .rays import pixel_rays
 #: Times as fast as brute force that is asked of every structure.
 LEAST = 5.0
 #: Ray-primitive pairs that brute force is timed with, and repeats.
-PAIRS, REPEATS = 2**20, 2
+PAIRS, REPEATS = 2**18, 2
 STRUCTURES = tuple(
     Contestant(name, "fast", parameters)
     for name, parameters in (
@@ -77,10 +77,10 @@ def against_brute(scenes, size, say):
             if c.name == "bsp-tree" and scene.n_primitives > BSP_MOST:
                 row[scene.name] = None
                 continue
-            say(f"{scene.name}: {c.label}")
             index = build(scene, c.name, **c.parameters)
             ratios = [_seconds(slow, some) / len(some) / (_seconds(index, rays) / len(rays)) for _ in range(REPEATS)]
             row[scene.name] = float(np.median(ratios))
+            say(f"{scene.name}: {c.label}: {row[scene.name]:.3g} x brute")
     for row in rows:
         row["least"] = min(value for name, value in row.items() if name != "technique" and value is not None)
     return rows

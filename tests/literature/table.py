@@ -20,22 +20,24 @@ if __name__ == "__main__":
 
 from rayscope.core import build
 from rayscope.core.fast.primitives import Primitives
+from rayscope.core.fast.primitives.polygon import Polygons
 from rayscope.core.fast.subdivision import grid as grid_module
 from rayscope.core.scene.spd import spd
 
 from . import havran
 
 
-def tables(step=16):
+def tables(step=16, scenes=havran.SCENES):
     """The lines of both tables, in Markdown."""
-    own_rule, own_overlaps = grid_module.cells_along, Primitives.overlaps
+    own_rule, own_overlaps, own_bounds = grid_module.cells_along, Primitives.overlaps, Polygons.bounds
     grids, octrees = [], []
     try:
-        for name in havran.SCENES:
+        for name in scenes:
+            Polygons.bounds = own_bounds
             scene = spd(name)
             rays = havran.rays_of(scene, step)
             over_hits = havran.rays_over_hits(scene, rays)
-            Primitives.overlaps = havran.by_open_boxes if name == "tetra" else havran.by_boxes
+            Polygons.bounds, Primitives.overlaps = havran.thick, havran.by_open_boxes if name == "tetra" else havran.by_boxes
             for density in havran.GRID:
                 resolution, empty, references, tests, steps = havran.GRID[density][name]
                 grid_module.cells_along = lambda *_, cells=resolution: list(cells)
@@ -55,7 +57,7 @@ def tables(step=16):
                 octrees.append(row(name, label, (f["N_G"], inner), (f["N_EE"], empty), (f["N_ER"], references), (n_it * over_hits, walked),
                                    (n_ts_root, steps_located), (n_ts, steps)))
     finally:
-        grid_module.cells_along, Primitives.overlaps = own_rule, own_overlaps
+        grid_module.cells_along, Primitives.overlaps, Polygons.bounds = own_rule, own_overlaps, own_bounds
     return [
         "| scene | density | N_V | N_EV | N_OIV | N_IT | N_TS |", "| --- | --- | --- | --- | --- | --- | --- |", *grids, "",
         "| scene | split | N_IN | N_EV | N_OIV | N_IT per hit | N_TS, O84 | N_TS, O93 |", "| --- | --- | --- | --- | --- | --- | --- | --- |", *octrees,
