@@ -401,6 +401,8 @@ def bench_options(sub):
     sub.add_argument("--growth", action="store_true", help="also how times grow from 1k to 1M triangles")
     sub.add_argument("--division", action="store_true", help="instead: what divides space, against brute force, its walks, lists and regions; "
                      "with --growth only how they grow, from 1k triangles on; --subdivisions 5: to 1M")
+    sub.add_argument("--directional", action="store_true", help="instead: what directional techniques gain, for rays of the camera, rays to a "
+                     "light, and the picture of the interior among the examples")
     sub.add_argument("--automatic", action="store_true", help="instead: the automatic choice of techniques against each fixed one, on the "
                      "procedural databases and the examples")
 
@@ -416,6 +418,13 @@ def bench_verb(call):
             text += f"\n\nOver {needs.BARS[0]:.0%} slower than the best, or over {needs.BARS[1]:.0%} slower than bvh: {', '.join(missed)}."
         record = report.record("bench", None, None, {"automatic": True, "size": size}, rows=rows, missed=missed)
         return Outcome(text, record, FAILED if missed else DONE)
+    if call.directional:
+        from .lab import directional
+        size = (640, 480)
+        rooms = ((room, size) for room in _examples(call, size, "interior.blend"))
+        result = directional.directional(call.subdivisions, rooms, call.repeats, call.seed, say=say)
+        record = report.record("bench", None, call.seed, {"directional": True, "subdivisions": call.subdivisions, "repeats": call.repeats}, **result)
+        return Outcome(directional.text(result), record, DONE if result["met"] else FAILED)
     if call.division:
         from .lab import division
         size = tuple(min(side, 128) for side in call.size)
@@ -435,10 +444,10 @@ def bench_verb(call):
     return Outcome("\n\n".join([bench.text(record), against_brute.text(balls)]), record, FAILED if result["failed"] else DONE)
 
 
-def _examples(call, size):
+def _examples(call, size, names="*.blend"):
     """The scenes of example_blends, one after the other; none, and a line that says so, where they cannot be read."""
     from dataclasses import replace
-    for path in sorted((Path(__file__).parents[1] / "example_blends").glob("*.blend")):
+    for path in sorted((Path(__file__).parents[1] / "example_blends").glob(names)):
         try:
             yield replace(call.open_in_blender(path, size), name=path.stem)
         except MissingPackageError as error:

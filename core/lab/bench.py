@@ -82,7 +82,7 @@ def bench(subdivisions=FULL_SIZE, size=(512, 512), repeats=5, seed=0, say=lambda
 
     # The loop over mathutils goes first, next to the default bvh: what is compared runs in the same second.
     ask, per_ray = {}, {}
-    for name, calls in (("embree", _embree_calls), ("mathutils", _mathutils_calls)):
+    for name, calls in (("embree", embree_calls), ("mathutils", mathutils_calls)):
         try:
             peer = build(scene, name)
         except MissingPackageError as error:
@@ -170,7 +170,7 @@ def _rays(scene, index, size, seed):
     return [primary, bounce_rays(hits, primary, diagonal, len(primary), rng), shadow_rays(scene, hits, primary, diagonal, len(primary), rng)]
 
 
-def _mathutils_calls(tree, sets, seed):
+def mathutils_calls(tree, sets, seed):
     """For each set, a loop over ray_cast on a sample of it; and the number of rays."""
     rng = np.random.default_rng(seed)
 
@@ -189,7 +189,7 @@ def _mathutils_calls(tree, sets, seed):
     return calls, n
 
 
-def _embree_calls(engine, sets, seed):
+def embree_calls(engine, sets, seed):
     """For each set, one call of embreex; and the number of rays."""
     calls = []
     for s in sets:
