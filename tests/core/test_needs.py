@@ -254,9 +254,13 @@ def loaded(said):
 @pytest.mark.parametrize("core", ["fast", "pure"])
 def test_a_plain_scene_loads_nothing_else(core, loaded):
     modules = loaded(f"r = trace(Scene([Object('mesh', mesh)], camera=camera), core='{core}', size=(4, 4))\n"
-                     "assert set(r.structures) == {'primary'} and not r.structures['primary'].primitives is None")
+                     "primitives = r.structures['primary'].primitives\n"
+                     "assert set(r.structures) == {'primary'}\n"
+                     "assert {p.KIND for p in getattr(primitives, 'kinds', primitives)} == {'triangle'}")
     assert f"{core}.hierarchies.bvh" in modules and f"{core}.primitives.triangle" in modules
-    unneeded = {f"{core}.primitives.{name}" for name in ("solids", "sphere", "box", "cylinder", "cone", "polygon", "polytope", "pyramid", "instance")}
+    unneeded = {f"{core}.primitives.{name}" for name in ("solids", "sphere", "box", "cylinder", "cone", "polygon", "polytope", "pyramid", "csg",
+                                                               "closed_mesh", "instance")}
+    unneeded |= {"contest", "lab.estimate", "scene.spd", "scene.nff", f"{core}.tracing.adaptive"}
     unneeded |= {f"{core}.tracing.{name}" for name in ("secondary", "optics", "lights", "shadows", "texture")}
     unneeded |= {f"{core}.{family}" for family in ("subdivision", "directional", "generalised")} | {"peers", "lab.needs", "lab.stability"}
     assert not unneeded & modules
@@ -267,8 +271,11 @@ def test_a_plain_scene_loads_nothing_else(core, loaded):
 @pytest.mark.parametrize("core", ["fast", "pure"])
 @pytest.mark.parametrize("code, module", [
     ("Scene([Object('mesh', mesh, materials=(Material(mirror=0.5),))], camera=camera)", "tracing.secondary"),
+    ("Scene([Object('mesh', mesh, materials=(Material(transmission=1.0),))], camera=camera)", "tracing.optics"),
+    ("Scene([Object('mesh', mesh)], [Light('lamp', 'point', (1, 1, 1), (3, 3, 3))], camera=camera)", "tracing.lights"),
     ("Scene([Object('ball', Shapes([solids.sphere((0, 0, 0), 1.0)]))], camera=camera)", "primitives.sphere"),
-], ids=["mirror", "sphere"])
+    ("Scene([Object('cut', Shapes([solids.difference(solids.box((0, 0, 0), (1, 1, 1)), solids.sphere((0, 0, 0), 0.5))]))], camera=camera)", "primitives.csg"),
+], ids=["mirror", "glass", "lamp", "sphere", "Boolean"])
 def test_what_is_needed_is_loaded(core, code, module, loaded):
     """The other half: the modules whose absence is tested above are those that do the work."""
     assert f"{core}.{module}" in loaded(f"trace({code}, core='{core}', size=(16, 16))")
