@@ -30,8 +30,6 @@ EPSILON = 2.0**-52
 T_BOUND = 8 * EPSILON
 #: A ray that passes an edge by less than this part of the coordinates may be taken for either side.
 EDGE = 64 * EPSILON
-#: Along a ray that grazes a plane at half a degree, t is so many times as badly determined.
-GRAZING = 115.0
 #: A case may take this many times the friendly case's time, unless its counters are as many times higher.
 SLOW = 10.0
 #: Times below this are the machine's, not ours: seconds.
@@ -131,9 +129,8 @@ def truth(case, scene, batch, hits):
             right = exact.nearest(o, d, lists, batch.t_min[r], batch.t_max[r])
         hit = hits.primitive[r] >= 0
         length = float(lengths(batch.d[r:r + 1])[0])
-        failed = False
+        failed, within = False, (batch.t_min[r], batch.t_max[r])
         if not hit:
-            within = batch.t_min[r], batch.t_max[r]
             failed = right is not None and _sure(o, d, right, lists, balls, slack, within)
             row["lost"] += failed
         else:
@@ -147,14 +144,14 @@ def truth(case, scene, batch, hits):
                 mine = lists[number]
                 off = math.sqrt(exact.squared_distance(at, *mine))
                 crossing = exact.triangle_plane(o, d, *mine)
-                own = crossing[0] if crossing else None
+                own = crossing[0] if crossing and min(crossing[1:]) >= 0 else None
             row["off_surface"] = max(row["off_surface"], off / (EPSILON * coordinates) if coordinates else 0.0)
             if off > slack:
                 row["ghost"] += 1
                 failed = True
             elif right is None:
                 pass                                                    # beside the edge, by less than rounding
-            elif number not in right[1] and float(exact.Fraction(t) - right[0]) * length > GRAZING * slack and _sure(o, d, right, lists, balls, slack):
+            elif number not in right[1] and float(exact.Fraction(t) - right[0]) * length > slack and _sure(o, d, right, lists, balls, slack, within):
                 row["wrong"] += 1
                 failed = True
             if own is not None and off <= slack:
@@ -492,6 +489,8 @@ def _truth_row(case, scene, batch, right, full):
         row |= truth(case, scene, part, picked)
         row["bad"] = some[row["bad"]].tolist()
     failed = [f"{row.get(k)} {k}" for k in ("lost", "ghost", "wrong", "leaks") if row.get(k)]
+    if row.get("t_error", 0.0) > T_BOUND / EPSILON:
+        failed.append(f"t off by {row['t_error']:.3g}")
     return row | {"verdict": ", ".join(failed) or "ok"}
 
 
