@@ -159,7 +159,7 @@ def test_a_pixel_is_its_covered_area(way):
 def test_finer_thresholds_cost_more_and_err_less(way):
     scene, size = lit(), (32, 24)
     rays, errors = [], []
-    for threshold in (0.3, 0.1, 0.02) if way == "corners" else (0.3, 0.05, 0.007):
+    for threshold in (0.3, 0.1, 0.02) if way == "corners" else (0.3, 0.03, 0.003):
         result = trace(scene, size=size, seed=1, antialiasing=way, aa_threshold=threshold, aa_level=3)
         rays.append(result.figures["primary"]["rays"])
         errors.append(math.sqrt(np.mean((result.image - reference(size)) ** 2)))
@@ -177,7 +177,7 @@ def test_fewer_rays_than_16_uniform_samples_for_the_same_error():
         return math.sqrt(np.mean([(r.image - reference(size)) ** 2 for r in results])), rays
 
     uniform = measured(samples=16)
-    for way, threshold, most in (("variance", 0.0085, 1.0), ("corners", 0.03, 1.15)):
+    for way, threshold, most in (("variance", 0.005, 1.0), ("corners", 0.03, 1.15)):
         error, rays = measured(antialiasing=way, aa_threshold=threshold, aa_level=3)
         assert error <= most * uniform[0], way
         assert rays <= uniform[1] / 2, way

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ...adaptive import DEPTHS, FIRST, SPENT, Adaptive
+from ...adaptive import ACROSS, DEPTHS, FIRST, OWN, SPENT, Adaptive
 from . import sampling
 from .whitted import WAVE
 
@@ -125,11 +125,12 @@ class Variance(Adaptive):
     """Pixels get more samples as long as that makes the picture better by as much as elsewhere.
 
     The samples are those of uniform sampling; with n of them a pixel gets as many again if its standard error, as
-    displayed, is above threshold * (n / FIRST)**(3/4). Then a sample more takes as much from the picture's squared error
-    everywhere (Neyman's allocation, 1934): stratified samples err less than their variance tells, as n**(-3/4).
+    displayed, is above threshold * n / FIRST * sqrt(rays of a sample there / rays of a sample on average). Then a ray
+    more takes about as much from the picture's squared error everywhere (Neyman's allocation, 1934; stratified samples
+    err less, the more they are, than their variance tells).
 
-    The variance is the pixel's, or the mean of the 3 x 3 pixels around it, if that is more: few samples of its own may
-    all miss an edge, and to stop where they happen to agree would make a bias.
+    In the variance the 3 x 3 pixels around have a part, and so has what their means differ by: few samples of its own
+    may all miss an edge, and to stop where they happen to agree would make a bias.
     """
 
     def parts(self, order):
@@ -138,14 +139,14 @@ class Variance(Adaptive):
         shape = (y1 - y0, x1 - x0)
         most = 4**self.level
         n = np.zeros(shape, np.int64)
-        total, squares = np.zeros((*shape, 3)), np.zeros((*shape, 3))
+        total, squares, rays = np.zeros((*shape, 3)), np.zeros((*shape, 3)), np.zeros(shape)
         begin = min(max(self.samples, FIRST), most)
         rounds = 1 + int(np.ceil(np.log2(most / begin)))
         for turn in range(rounds):
             if turn == 0:
                 more = np.full(shape, begin)
             else:
-                more = np.where(self._noisy(n, total, squares), np.minimum(n, most - n), 0)
+                more = np.where(self._noisy(n, total, squares, rays), np.minimum(n, most - n), 0)
             for i, tile in enumerate(order):
                 part = np.s_[tile[1] - y0 : tile[3] - y0, tile[0] - x0 : tile[2] - x0]
                 if not more[part].any():
@@ -154,8 +155,9 @@ class Variance(Adaptive):
                 for py, px, number in self._samples(n[part], more[part]):
                     pixels = (tile[1] + py) * self.tracer.size[0] + tile[0] + px
                     out = self.tracer.sampled(pixels, number)
-                    spent.append((pixels, taken(out)))
-                    radiance = out.pop("combined")
+                    costs, radiance = taken(out), out.pop("combined")
+                    spent.append((pixels, costs))
+                    np.add.at(rays[part], (py, px), costs["rays_per_pixel"])
                     np.add.at(total[part], (py, px), radiance)
                     np.add.at(squares[part], (py, px), radiance * radiance)
                     begun = np.flatnonzero(number == 0)
@@ -177,14 +179,18 @@ class Variance(Adaptive):
             w = which[part]
             yield py[w], px[w], n[py[w], px[w]] + within[part]
 
-    def _noisy(self, n, total, squares):
+    def _noisy(self, n, total, squares, rays):
         """Who is worth as many samples again."""
         mean = total / n[..., None]
         variance = np.maximum(squares / n[..., None] - mean * mean, 0.0) * (n / (n - 1))[..., None]
-        error = np.sqrt(np.maximum(variance, _mean_of_9(variance)) / n[..., None])
+        seen = np.minimum(mean, 1.0)
+        differ = np.maximum(_mean_of_9(seen * seen) - _mean_of_9(seen) ** 2, 0.0)
+        variance = OWN * variance + (1.0 - OWN) * _mean_of_9(variance) + ACROSS * differ
+        error = np.sqrt(variance / n[..., None])
         # Either way: a pixel that is all white so far can only become darker.
         off = np.maximum(shown(mean + error) - shown(mean), shown(mean) - shown(mean - error))
-        return (off > self.threshold * (n / FIRST)[..., None] ** 0.75).any(axis=-1)
+        cost = rays / n
+        return (off > (self.threshold * n / FIRST * np.sqrt(cost / cost.mean()))[..., None]).any(axis=-1)
 
 
 def _mean_of_9(a):

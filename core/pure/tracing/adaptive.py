@@ -2,7 +2,7 @@
 
 import math
 
-from ...adaptive import DEPTHS, FIRST, SPENT, Adaptive
+from ...adaptive import ACROSS, DEPTHS, FIRST, OWN, SPENT, Adaptive
 from . import sampling
 from .camera import through
 from .vectors import add, mul, times
@@ -112,11 +112,12 @@ class Variance(Counted):
     """Pixels get more samples as long as that makes the picture better by as much as elsewhere.
 
     The samples are those of uniform sampling; with n of them a pixel gets as many again if its standard error, as
-    displayed, is above threshold * (n / FIRST)**(3/4). Then a sample more takes as much from the picture's squared error
-    everywhere (Neyman's allocation, 1934): stratified samples err less than their variance tells, as n**(-3/4).
+    displayed, is above threshold * n / FIRST * sqrt(rays of a sample there / rays of a sample on average). Then a ray
+    more takes about as much from the picture's squared error everywhere (Neyman's allocation, 1934; stratified samples
+    err less, the more they are, than their variance tells).
 
-    The variance is the pixel's, or the mean of the 3 x 3 pixels around it, if that is more: few samples of its own may
-    all miss an edge, and to stop where they happen to agree would make a bias.
+    In the variance the 3 x 3 pixels around have a part, and so has what their means differ by: few samples of its own
+    may all miss an edge, and to stop where they happen to agree would make a bias.
     """
 
     def parts(self, order):
@@ -127,13 +128,15 @@ class Variance(Counted):
         everywhere = [(x, y) for y in range(y0, y1) for x in range(x0, x1)]
         #: Pixel -> number of samples, their sum, the sum of their squares.
         self.state = {pixel: (0, (0.0,) * 3, (0.0,) * 3) for pixel in everywhere}
+        self.rays = dict.fromkeys(everywhere, 0)
         rounds = 1 + math.ceil(math.log2(most / begin))
         for turn in range(rounds):
             if turn == 0:
                 more = dict.fromkeys(everywhere, begin)
             else:
                 variances = {pixel: self._variance(pixel) for pixel in everywhere}
-                noisy = [pixel for pixel in everywhere if self._noisy(pixel, variances)]
+                cost = sum(self.rays[pixel] / self.state[pixel][0] for pixel in everywhere) / len(everywhere)
+                noisy = [pixel for pixel in everywhere if self._noisy(pixel, variances, cost)]
                 more = {pixel: min(self.state[pixel][0], most - self.state[pixel][0]) for pixel in noisy}
             for i, tile in enumerate(order):
                 out, combined, worked = {}, [], False
@@ -151,7 +154,9 @@ class Variance(Counted):
     def _sampled(self, x, y):
         """Take a pixel's next sample; the passes that the first one gives."""
         n, total, squares = self.state[x, y]
-        values = self._spend(x, y, self.tracer.pixel(x, y, n))
+        values = self.tracer.pixel(x, y, n)
+        self.rays[x, y] += values["rays_per_pixel"]
+        self._spend(x, y, values)
         radiance = values.pop("combined")
         self.state[x, y] = n + 1, add(total, radiance), add(squares, mul(radiance, radiance))
         return values
@@ -161,18 +166,21 @@ class Variance(Counted):
         n, total, squares = self.state[pixel]
         return tuple(max(s / n - (t / n) ** 2, 0.0) * (n / (n - 1)) for s, t in zip(squares, total))
 
-    def _noisy(self, pixel, variances):
+    def _noisy(self, pixel, variances, cost):
         """Whether it is worth as many samples again."""
         x, y = pixel
-        near = [variances[p] for dy in (-1, 0, 1) for dx in (-1, 0, 1) if (p := (x + dx, y + dy)) in variances]
+        near = [p for dy in (-1, 0, 1) for dx in (-1, 0, 1) if (p := (x + dx, y + dy)) in variances]
         n, total, _ = self.state[pixel]
         for channel in range(3):
             mean = total[channel] / n
-            variance = max(variances[pixel][channel], sum(v[channel] for v in near) / len(near))
+            seen = [min(self.state[p][1][channel] / self.state[p][0], 1.0) for p in near]
+            differ = max(sum(s * s for s in seen) / len(near) - (sum(seen) / len(near)) ** 2, 0.0)
+            around = sum(variances[p][channel] for p in near) / len(near)
+            variance = OWN * variances[pixel][channel] + (1.0 - OWN) * around + ACROSS * differ
             error = math.sqrt(variance / n)
             # Either way: a pixel that is all white so far can only become darker.
             off = max(shown(mean + error) - shown(mean), shown(mean) - shown(mean - error))
-            if off > self.threshold * (n / FIRST) ** 0.75:
+            if off > self.threshold * n / FIRST * math.sqrt(self.rays[pixel] / n / cost):
                 return True
         return False
 
