@@ -12,10 +12,6 @@ from ..rendering import Rendering
 COLUMNS = ("case", "technique", "core", "pixels", "wrong", "not_finite", "brightest", "seconds", "slow", "work", "verdict")
 #: Part of the picture's largest value by which a pixel may differ. Near the critical angle rounding counts as its root does.
 SAME = 1e-6
-#: Cones, pyramids and beams: where they fall back on rays each sends several at every bounce, 16^depth; they go so deep.
-AREA_DEPTH = 2
-#: What sees areas may sample them elsewhere in the other core: the pictures' means may differ by this part of the largest value.
-AREA_NOISE = 0.05
 #: What surroundings of 1 may become by rounding in single precision.
 FULL = 1.0 + 1e-5
 #: A picture may take this many times as long as the friendly one, unless it has as many more rays, tests and steps.
@@ -37,9 +33,8 @@ def traced(case, seed, name, core):
     row = technique(name)
     base = name if row.rays == ALL_RAYS else "brute"
     others = {} if base == name else dict.fromkeys(row.rays, name)
-    depth = case.depth if row.ray_by_ray else min(case.depth, AREA_DEPTH)
     with np.errstate(over="ignore", invalid="ignore"):
-        rendering = Rendering(scene, base, core, (case.side, case.side), depth, count=True, **others)
+        rendering = Rendering(scene, base, core, (case.side, case.side), case.depth, count=True, **others)
         start = time.thread_time()
         for _ in rendering.tiles():
             pass
@@ -72,8 +67,6 @@ def examine(case, seed, name, core, right, base=None):
     with np.errstate(invalid="ignore"):
         largest = max(float(np.abs(right).max()), 1.0)
         apart = ~(np.abs(picture - right).max(axis=1) <= SAME * largest)
-        if not technique(name).ray_by_ray and np.abs(picture.mean(axis=0) - right.mean(axis=0)).max() <= AREA_NOISE * largest:
-            apart[:] = False
     row |= {"wrong": int(apart.sum()), "bad": np.flatnonzero(apart).tolist()}
     if row["wrong"]:
         failed.append(f"{row['wrong']} wrong")
