@@ -97,7 +97,6 @@ class FootprintTracer(Whitted):
     def __init__(self, scene, structures, *arguments, **more):
         super().__init__(scene, structures, *arguments, **more)
         self.rays_each = structures["primary"].parameters["samples"]
-        self.notices = structures["primary"].notices
         self.pace = {kind: Pace() for kind in self.probe}
 
     def worth(self, weight):

@@ -1,9 +1,10 @@
 """Pictures from beams: every pixel is the sum, by area, of the fragments that lie in it.
 
 What of a surface is seen in a pixel has the colour of its centre; what of it is lit by a light is shaded at four points,
-which is exact up to the third order. Visibility, mirrors and the shadows of lights without extent are exact, refraction is paraxial. The
-rest is sampled by rays, several a pixel: what lies beyond the boxes around primitives that are no polygons, what is seen
-in smooth-shaded (curved) mirrors and in glass at grazing angles, soft shadows, and light that has come through glass.
+which is exact up to the third order. Visibility, mirrors and the shadows of lights without extent are exact, refraction
+is paraxial. The rest is sampled by rays, several a pixel: what lies beyond the boxes around primitives that are no
+polygons, what is seen in smooth-shaded (curved) mirrors and in glass at grazing angles, soft shadows, and light that has
+come through glass.
 """
 
 import math
@@ -90,14 +91,15 @@ class BeamTracer(Whitted):
     def __init__(self, scene, structures, *more, **options):
         super().__init__(scene, structures, *more, **options)
         self.structure = structures["primary"]
+        self._told = len(self.structure.notices)
         #: Numbers of the lights whose shadows have hard edges.
         self.hard = [k for k, (light, _) in enumerate(self.lights) if light.shadows and not (self.soft and light.has_extent)]
 
     @property
     def notices(self):
-        """What cannot be done as asked; more is known when the first tile was traced."""
+        """What cannot be done as asked, beyond what the structure told when it was built: known with the first tile."""
         crowded = self.tree is not None and self.tree.full and self.tree.bsp is not None
-        return [*self.structure.notices, *([fragments_notice(self.tree.most)] if crowded else [])]
+        return [*self.structure.notices[self._told :], *([fragments_notice(self.tree.most)] if crowded else [])]
 
     def grow(self):
         """Cast all beams."""

@@ -75,7 +75,6 @@ class FootprintTracer(Whitted):
     def __init__(self, scene, structures, *arguments, **more):
         super().__init__(scene, structures, *arguments, **more)
         self.rays_each = structures["primary"].parameters["samples"]
-        self.notices = structures["primary"].notices
 
     def worth(self, weight):
         """How many rays a cone is worth that weighs so much, a colour, in its pixel."""
