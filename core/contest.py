@@ -62,6 +62,11 @@ class Contest:
         """The leader's row of the catalogue."""
         return self.leader.technique
 
+    @property
+    def notices(self):
+        """What those built so far could not do as asked."""
+        return [notice for structure in self.structures for notice in structure.notices]
+
     def for_light(self, light):
         """The same contest, about shadow rays to a light: for these some have a structure of its own."""
         return OneLight(self, light)
