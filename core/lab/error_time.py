@@ -216,7 +216,8 @@ class _Sweep:
     def _cost_of_a_sample(self):
         """Seconds of one sample of all pixels."""
         self._traced({**self.full, "samples": 1}, self.seed, work=0)  # what is imported or built at first use
-        return max(self._traced({**self.full, "samples": 2}, self.seed, work=0).figures["T_R"] / 2.0, 1e-4)
+        # One alone would cost more than each of many, which are traced together.
+        return max(self._traced({**self.full, "samples": 6}, self.seed, work=0).figures["T_R"] / 6.0, 1e-4)
 
     def _traced(self, options, seed, scene=0, count=False, work=0.0, technique="", seconds=math.inf):
         """A picture; raises Cancelled when stopped, _TooLong after some seconds."""
