@@ -35,7 +35,7 @@ PARAMETERS = (
         "aa_threshold",
         0.03,
         "Adaptive antialiasing: differences in displayed values, 0 to 1, that are put up with: between corners; "
-        "as standard error of a pixel",
+        "as the standard error of a pixel with 4 samples, n / 4 of it with n",
         low=0.0,
         high=1.0,
     ),
