@@ -30,8 +30,6 @@ STRUCTURES = tuple(
     )
 )  # fmt: skip
 DATABASES = ("balls", "gears", "lattice", "mount", "rings", "teapot", "tetra", "tree")
-#: Primitives above which a BSP tree is not built here: it would take minutes.
-BSP_MOST = 300_000
 WALKS = ("root", "intervals", "links", "heap")
 
 
@@ -60,29 +58,26 @@ def division(subdivisions=4, size=(128, 128), databases=DATABASES, say=lambda li
     brute = against_brute([large, *(spd(name) for name in databases)], size, say)
     say("walks, lists, regions, separated lists")
     rays = pixel_rays(large.camera, size)
-    ratios = [value for row in brute for name, value in row.items() if name not in ("technique", "least") and value is not None]
+    ratios = [value for row in brute for name, value in row.items() if name not in ("technique", "least")]
     return {"primitives": large.n_primitives, "rays": len(rays), "note": note, "brute": brute, "walks": walks(large, rays),
             "regions": regions(large, rays), "lists": lists(large, rays), "separated": separated(large, rays),
             "met": min(ratios) >= LEAST}
 
 
 def against_brute(scenes, size, say):
-    """How many times as fast as brute force each structure is: one row a structure, one column a scene; None where it was left out."""
+    """How many times as fast as brute force each structure is: one row a structure, one column a scene."""
     rows = [{"technique": c.label} for c in STRUCTURES]
     for scene in scenes:
         rays = pixel_rays(scene.camera, size)
         some = rays.take(slice(None, None, max(1, -(-len(rays) * scene.n_primitives // PAIRS))))
         slow = build(scene, "brute")
         for row, c in zip(rows, STRUCTURES):
-            if c.name == "bsp-tree" and scene.n_primitives > BSP_MOST:
-                row[scene.name] = None
-                continue
             index = build(scene, c.name, **c.parameters)
             ratios = [_seconds(slow, some) / len(some) / (_seconds(index, rays) / len(rays)) for _ in range(REPEATS)]
             row[scene.name] = float(np.median(ratios))
             say(f"{scene.name}: {c.label}: {row[scene.name]:.3g} x brute")
     for row in rows:
-        row["least"] = min(value for name, value in row.items() if name != "technique" and value is not None)
+        row["least"] = min(value for name, value in row.items() if name != "technique")
     return rows
 
 
@@ -171,8 +166,6 @@ def growth(levels=range(6), size=(128, 128), say=lambda line: None):
         scene = Scene(scene.objects[:1], scene.lights, scene.camera, name=scene.name)
         rays = pixel_rays(scene.camera, size)
         for name in GROWERS:
-            if name == "bsp-tree" and scene.n_primitives > BSP_MOST:
-                continue
             say(f"growth: {name}, {scene.n_primitives} triangles")
             start = time.process_time()
             index = build(scene, name)

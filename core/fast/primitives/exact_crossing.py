@@ -19,6 +19,8 @@ FEW = 12
 SURE = 2.0**-50
 #: What t is off by is rounded itself: only where it is a smaller part of t the result is right.
 NEAR = 2.0**-16
+#: What a sum of products in two parts may be off by, relative to the sum of their sizes; and what t may be, to be rounded once.
+LOST, EXACT = 2.0**-97, 2.0**-62
 
 
 def refined(o, d, rows, t, low, high, deep):
@@ -98,7 +100,14 @@ def _double(o, d, rows, t):
         x, y, z = ((whole[:, k], rest[:, k]) for k in range(3))
         (height, slope), rest = plus(plus(x, y), z)
         off = (height + rest[0]) / (slope + rest[1])
-        return t - off, (np.abs(off) < NEAR * np.abs(t)) & (np.abs(slope) > SURE * np.abs(d).max(axis=0))
+        found, size, steep = t - off, np.abs(t), np.abs(slope)
+        # Both sums may cancel. And what is left of the last must tell to which side to round.
+        lost = LOST * np.abs(whole).sum(axis=1)
+        left, step = np.abs((t - found) - off), np.spacing(np.abs(found))
+        sure = (np.abs(off) < NEAR * size) & (steep > SURE * np.abs(d).max(axis=0))
+        sure &= (lost[0] <= EXACT * size * steep) & (lost[1] <= EXACT / NEAR * steep)
+        sure &= (np.abs(left - 0.5 * step) > 2.0 * EXACT * size) & (np.abs(left - 0.25 * step) > 2.0 * EXACT * size)
+        return found, sure
 
 
 def difference(a, b):

@@ -5,7 +5,7 @@ import math
 
 from . import box_common
 from .solids import EPSILON, dot
-from .triangle import Triangle
+from .triangle import Triangle, sized
 
 
 class ClosedMesh:
@@ -20,7 +20,7 @@ class ClosedMesh:
     def __init__(self, placed):
         xyz, flip = placed.mesh_corners()
         obj, primitive = int(placed.object_of[0]), int(placed.primitive_of[0])
-        self.triangles = [Triangle(tuple(c[0:3]), tuple(c[3:6]), tuple(c[6:9]), obj, primitive, flip) for c in xyz.T.tolist()]
+        self.triangles = sized([Triangle(tuple(c[0:3]), tuple(c[3:6]), tuple(c[6:9]), obj, primitive, flip) for c in xyz.T.tolist()])
         self.flip = flip
         self.lo, self.hi = (tuple(f(x) for x in zip(*(getattr(t, end) for t in self.triangles))) for f, end in ((min, "lo"), (max, "hi")))
 

@@ -10,7 +10,7 @@ import math
 from ...scene.solids import Corners
 from . import Primitive
 from .solids import EPSILON, clamp, divide, dot
-from .triangle import TRIM, Triangle
+from .triangle import TRIM, Triangle, sized
 
 #: Heights at which an inscribed box is tried, and places in the widest stretch there.
 HEIGHTS, PLACES = 9, (0.5, 0.25, 0.75)
@@ -43,8 +43,8 @@ class ThreeCorners:
         """The list of placed triangles."""
         points = Corners.of(placed)
         xyz = [tuple(p) for p in points.xyz.T.tolist()]
-        return [Triangle(*xyz[3 * k:3 * k + 3], obj, primitive, flip) for k, (obj, primitive, flip)
-                in enumerate(zip(placed.object_of.tolist(), placed.primitive_of.tolist(), placed.mirrors().tolist()))]
+        return sized([Triangle(*xyz[3 * k:3 * k + 3], obj, primitive, flip) for k, (obj, primitive, flip)
+                      in enumerate(zip(placed.object_of.tolist(), placed.primitive_of.tolist(), placed.mirrors().tolist()))])
 
 
 class Polygon(Primitive):
