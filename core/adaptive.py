@@ -3,6 +3,8 @@
 What is judged are displayed values: 0 to 1, brighter than white is white, with a gamma of 2.
 """
 
+import math
+
 #: Corners whose depths differ by more than this ratio belong to different surfaces.
 DEPTHS = 1.1
 #: Samples of a pixel before its error is judged, at least.
@@ -53,3 +55,29 @@ class Adaptive:
             Pixels, y * width + x, also more than once; pass -> what rays of those pixels have cost.
         """
         raise NotImplementedError
+
+
+class ByVariance(Adaptive):
+    """Pixels get more samples as long as that makes the picture better by as much as elsewhere.
+
+    The samples are those of uniform sampling; with n of them a pixel gets as many again if its standard error, as
+    displayed, is above threshold * n / FIRST * sqrt(rays of a sample there / rays of a sample on average). Then a ray
+    more takes about as much from the picture's squared error everywhere (Neyman's allocation, 1934; stratified samples
+    err less, the more they are, than their variance tells).
+
+    In the variance the 3 x 3 pixels around have a part, and so has what their means differ by: few samples of its own
+    may all miss an edge, and to stop where they happen to agree would make a bias.
+
+    Attributes
+    ----------
+    begin, most : int
+        Samples of a pixel, at first and at most.
+    rounds : int
+        Times that samples are taken: each takes as many again as there are, at most.
+    """
+
+    def __init__(self, *arguments):
+        super().__init__(*arguments)
+        self.most = 4**self.level
+        self.begin = min(max(self.samples, FIRST), self.most)
+        self.rounds = 1 + math.ceil(math.log2(self.most / self.begin))

@@ -1,10 +1,10 @@
 """The quickest of several structures, found out while a picture is traced."""
 
 import time
-from dataclasses import fields
 
 import numpy as np
 
+from .fast.rays import left, part
 from .hits import Hits
 
 #: Seconds that rays have taken before the first trial: before, one costs more than it can bring.
@@ -83,20 +83,19 @@ class Contest:
     def closest(self, origins, directions, t_min=0.0, t_max=np.inf, count=False, progress=None, leaving=None, light=None):
         """As of a structure."""
         def ask(structure, which):
-            return structure.closest(origins[which], directions[which], _part(t_min, which), _part(t_max, which), count, progress,
-                                     _left(structure, leaving, which))
+            return structure.closest(origins[which], directions[which], part(t_min, which), part(t_max, which), count, progress,
+                                     left(structure, leaving, which))
 
         answers, order = self._put(len(origins), ask, light)
         if order is None:
             return answers[0]
-        columns = {f.name: [getattr(a, f.name) for a in answers] for f in fields(Hits)}
-        return Hits(**{name: None if some[0] is None else np.concatenate(some)[order] for name, some in columns.items()})
+        return Hits.joined(answers).take(order)
 
     def occluded(self, origins, directions, t_min=0.0, t_max=np.inf, count=False, progress=None, leaving=None, through=None, light=None):
         """As of a structure."""
         def ask(structure, which):
-            answer = structure.occluded(origins[which], directions[which], _part(t_min, which), _part(t_max, which), count, progress,
-                                        _left(structure, leaving, which), through)
+            answer = structure.occluded(origins[which], directions[which], part(t_min, which), part(t_max, which), count, progress,
+                                        left(structure, leaving, which), through)
             return answer if count else (answer, {})
 
         answers, order = self._put(len(origins), ask, light)
@@ -178,13 +177,3 @@ class OneLight:
     def occluded(self, *arguments, **more):
         """As of a structure."""
         return self.contest.occluded(*arguments, **more, light=self.light)
-
-
-def _part(value, which):
-    """Some of an array, or the number that stands for all."""
-    return value[which] if np.ndim(value) else value
-
-
-def _left(structure, leaving, which):
-    """What a structure is told of where the rays start, if it wants to know."""
-    return np.asarray(leaving)[:, which] if structure.follows and leaving is not None else None

@@ -1,6 +1,6 @@
 """What a structure answers: hits, and the cells it consists of."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 
@@ -47,6 +47,17 @@ class Hits:
 
     def __len__(self):
         return len(self.t)
+
+    @classmethod
+    def joined(cls, parts):
+        """Those of several lots of rays, one after the other."""
+        columns = {f.name: [getattr(part, f.name) for part in parts] for f in fields(cls)}
+        return cls(**{name: None if some[0] is None else np.concatenate(some) for name, some in columns.items()})
+
+    def take(self, order):
+        """Some of the hits, in another order."""
+        columns = {f.name: getattr(self, f.name) for f in fields(self)}
+        return Hits(**{name: None if column is None else column[order] for name, column in columns.items()})
 
     @property
     def hit(self):

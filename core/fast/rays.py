@@ -158,6 +158,16 @@ def blocks(n):
     return [slice(first, min(first + BLOCK, n)) for first in range(0, n, BLOCK)]
 
 
+def part(value, which):
+    """Some of a column of rays, or the number that stands for all."""
+    return value[which] if np.ndim(value) else value
+
+
+def left(structure, leaving, which):
+    """What a structure is told of where some rays start, if it wants to know."""
+    return np.asarray(leaving)[:, which] if structure.follows and leaving is not None else None
+
+
 def _apex(origins):
     """The point where all rays start, three floats, or None."""
     first = origins[:, :1]

@@ -45,9 +45,9 @@ def watertight(a, b, c, *corners):
 
 def rounding(a, b, c):
     """What tells how far rounding may move t on a triangle: twice its area, and that times its looseness."""
-    e, f, g = _minus(b, a), _minus(c, a), _minus(c, b)
+    e, f, g = minus(b, a), minus(c, a), minus(c, b)
     extent = max(abs(x) for x in (*e, *f, *g))
-    x, y, z = _cross(e, f)
+    x, y, z = cross(e, f)
     area = math.sqrt(x * x + y * y + z * z)
     return area, extent * (area + extent * extent)
 
@@ -75,8 +75,8 @@ def refined(o, d, corners, t, low, high, deep):
 
 def nearby(o, d, a, b, c, t):
     """Where a line crosses the plane of a triangle, but for rounding errors of the triangle's size; t: about there."""
-    normal = _cross(_minus(b, a), _minus(c, a))
-    slope = _dot(normal, d)
+    normal = cross(minus(b, a), minus(c, a))
+    slope = dot(normal, d)
     t, _ = _split(t)
     off = []
     for x, y, p in zip(o, d, a):
@@ -85,7 +85,7 @@ def nearby(o, d, a, b, c, t):
         whole = x - p
         back = whole - x
         off.append((whole + upper * t) + (lower * t + ((x - (whole - back)) - (p + back))))
-    return t - _dot(normal, off) / slope if slope else math.nan
+    return t - dot(normal, off) / slope if slope else math.nan
 
 
 def _split(x):
@@ -111,10 +111,10 @@ def crossing(o, d, a, b, c):
     """
     whole = iter(_whole(*o, *d, *a, *b, *c))
     o, d, a, b, c = zip(whole, whole, whole)
-    normal = _cross(_minus(b, a), _minus(c, a))
-    slope = _dot(normal, d)
+    normal = cross(minus(b, a), minus(c, a))
+    slope = dot(normal, d)
     try:
-        return _dot(normal, _minus(a, o)) / slope if slope else math.nan
+        return dot(normal, minus(a, o)) / slope if slope else math.nan
     except OverflowError:
         return math.nan
 
@@ -123,18 +123,18 @@ def collinear(a, b, c):
     """Whether three points lie on one line."""
     whole = iter(_whole(*a, *b, *c))
     a, b, c = zip(whole, whole, whole)
-    return not any(_cross(_minus(b, a), _minus(c, a)))
+    return not any(cross(minus(b, a), minus(c, a)))
 
 
-def _minus(a, b):
+def minus(a, b):
     return a[0] - b[0], a[1] - b[1], a[2] - b[2]
 
 
-def _cross(a, b):
+def cross(a, b):
     return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
 
 
-def _dot(a, b):
+def dot(a, b):
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 

@@ -9,7 +9,7 @@ could still be nearer, or is too near to an edge to be excluded, is tested too: 
 import numpy as np
 
 from ...hits import Cells
-from ..rays import blocks
+from ..rays import BLOCK, blocks
 from .raster import Grid, spans
 from .second import Handing
 from .view import Footprints, View
@@ -20,8 +20,6 @@ TILE = 16
 LOSS = 2.0**-20
 #: Rows of pixels longer than this are not recognised.
 WIDEST = 16_384
-#: Points looked at together when a grid is recognised.
-CACHED = 8_192
 #: Pairs of footprints and rays collected before they are tested.
 PAIRS = 262_144
 
@@ -280,7 +278,7 @@ def pixel_grid(u, v):
         # Rows that are cut off, then the full ones, some at a time.
         first = -(-offset // width)
         last = (n + offset) // width
-        some = max(1, CACHED // width)
+        some = max(1, BLOCK // width)
         parts = [(0, 1)] * (first > 0) + [(j, min(j + some, last)) for j in range(first, last, some)] + [(rows - 1, rows)] * (rows > max(first, last))
         for j, end in parts:
             a, b = max(0, j * width - offset), min(n, end * width - offset)

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ...adaptive import ACROSS, DEPTHS, FIRST, OWN, SPENT, Adaptive
+from ...adaptive import ACROSS, DEPTHS, FIRST, OWN, SPENT, Adaptive, ByVariance
 from . import sampling
 from .whitted import WAVE
 
@@ -121,32 +121,20 @@ class Corners(Adaptive):
         return differ
 
 
-class Variance(Adaptive):
-    """Pixels get more samples as long as that makes the picture better by as much as elsewhere.
-
-    The samples are those of uniform sampling; with n of them a pixel gets as many again if its standard error, as
-    displayed, is above threshold * n / FIRST * sqrt(rays of a sample there / rays of a sample on average). Then a ray
-    more takes about as much from the picture's squared error everywhere (Neyman's allocation, 1934; stratified samples
-    err less, the more they are, than their variance tells).
-
-    In the variance the 3 x 3 pixels around have a part, and so has what their means differ by: few samples of its own
-    may all miss an edge, and to stop where they happen to agree would make a bias.
-    """
+class Variance(ByVariance):
+    """More samples where they take most from the error."""
 
     def parts(self, order):
         """See :class:`Adaptive`."""
         x0, y0, x1, y1 = self.region
         shape = (y1 - y0, x1 - x0)
-        most = 4**self.level
         n = np.zeros(shape, np.int64)
         total, squares, rays = np.zeros((*shape, 3)), np.zeros((*shape, 3)), np.zeros(shape)
-        begin = min(max(self.samples, FIRST), most)
-        rounds = 1 + int(np.ceil(np.log2(most / begin)))
-        for turn in range(rounds):
+        for turn in range(self.rounds):
             if turn == 0:
-                more = np.full(shape, begin)
+                more = np.full(shape, self.begin)
             else:
-                more = np.where(self._noisy(n, total, squares, rays), np.minimum(n, most - n), 0)
+                more = np.where(self._noisy(n, total, squares, rays), np.minimum(n, self.most - n), 0)
             for i, tile in enumerate(order):
                 part = np.s_[tile[1] - y0 : tile[3] - y0, tile[0] - x0 : tile[2] - x0]
                 if not more[part].any():
@@ -166,7 +154,7 @@ class Variance(Adaptive):
                 n[part] += more[part]
                 first = {name: np.concatenate(values) for name, values in first.items()}
                 first["combined"] = (total[part] / n[part][..., None]).reshape(-1, 3)
-                yield (turn + (i + 1) / len(order)) / rounds, tile, first, _joined(spent)
+                yield (turn + (i + 1) / len(order)) / self.rounds, tile, first, _joined(spent)
 
     @staticmethod
     def _samples(n, more):

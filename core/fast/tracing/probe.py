@@ -1,12 +1,12 @@
 """Asking a structure, in pieces so short that progress can be shown and a run stopped; counting what it cost."""
 
 import time
-from dataclasses import fields
 
 import numpy as np
 
 from ...hits import Hits
 from ...tracer import COUNTED
+from ..rays import left, part
 
 #: Seconds that one piece may take: half of what a user may have to wait for the run to stop.
 PIECE = 0.08
@@ -34,18 +34,17 @@ class Probe:
             return self.structure.closest(
                 o[:, s].T,
                 d[:, s].T,
-                t_min=_part(t_min, s),
-                t_max=_part(t_max, s),
+                t_min=part(t_min, s),
+                t_max=part(t_max, s),
                 count=self.count,
                 progress=self._progress,
-                **self._left(leaving, s),
+                leaving=left(self.structure, leaving, s),
             )
 
         parts = self._in_pieces(o.shape[1], ask)
         if len(parts) == 1:
             return parts[0]
-        joined = {f.name: [getattr(p, f.name) for p in parts] for f in fields(Hits)}
-        return Hits(**{name: None if values[0] is None else np.concatenate(values) for name, values in joined.items()})
+        return Hits.joined(parts)
 
     def occluded(self, o, d, t_max, leaving=None, through=None):
         """What a structure says of rays given as columns, and the counts."""
@@ -54,21 +53,17 @@ class Probe:
             answer = self.structure.occluded(
                 o[:, s].T,
                 d[:, s].T,
-                t_max=_part(t_max, s),
+                t_max=part(t_max, s),
                 count=self.count,
                 progress=self._progress,
                 through=through,
-                **self._left(leaving, s),
+                leaving=left(self.structure, leaving, s),
             )
             return answer if self.count else (answer, {})
 
         parts = self._in_pieces(o.shape[1], ask)
         counts = {name: np.concatenate([c[name] for _, c in parts]) for name in (COUNTED if self.count else ())}
         return np.concatenate([blocked for blocked, _ in parts]), counts
-
-    def _left(self, leaving, s):
-        """What the structure is told of where the rays start, if it wants to know."""
-        return {"leaving": leaving[:, s]} if self.structure.follows and leaving is not None else {}
 
     def _progress(self, fraction):
         self.check()
@@ -89,8 +84,3 @@ class Probe:
             start += size
             self.check()
         return answers
-
-
-def _part(value, s):
-    """A slice of an array, or the number that stands for all."""
-    return value[s] if np.ndim(value) else value

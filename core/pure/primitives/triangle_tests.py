@@ -7,25 +7,14 @@ that hits the front, its interval's two comparisons included; signs (negation, a
 
 import math
 
+from ...scene.exact import cross, dot, minus
 from .triangle import Triangle
-
-
-def _sub(a, b):
-    return a[0] - b[0], a[1] - b[1], a[2] - b[2]
-
-
-def _cross(a, b):
-    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
-
-
-def _dot(a, b):
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
 def _normal(a, b, c):
     """Two edges, their cross product, and the axis along which it is longest."""
-    e, f = _sub(b, a), _sub(c, a)
-    n = _cross(e, f)
+    e, f = minus(b, a), minus(c, a)
+    n = cross(e, f)
     return e, f, n, max(range(3), key=lambda axis: abs(n[axis]))
 
 
@@ -50,27 +39,27 @@ def moller_trumbore(ray, triangle):
     (t, u, v), or None
         On the whole line; weights of the second and the third vertex.
     """
-    e, f = _sub(triangle.b, triangle.a), _sub(triangle.c, triangle.a)
-    p = _cross(ray.d, f)
-    det = _dot(e, p)
+    e, f = minus(triangle.b, triangle.a), minus(triangle.c, triangle.a)
+    p = cross(ray.d, f)
+    det = dot(e, p)
     if det == 0.0:
         return None
     inverse = 1.0 / det
-    s = _sub(ray.o, triangle.a)
-    u = _dot(s, p) * inverse
+    s = minus(ray.o, triangle.a)
+    u = dot(s, p) * inverse
     if not 0.0 <= u <= 1.0:
         return None
-    q = _cross(s, e)
-    v = _dot(ray.d, q) * inverse
+    q = cross(s, e)
+    v = dot(ray.d, q) * inverse
     if not (v >= 0.0 and u + v <= 1.0):
         return None
-    return _dot(f, q) * inverse, u, v
+    return dot(f, q) * inverse, u, v
 
 
 def plane(a, b, c):
     """For Badouel's test: the longest axis of the normal, the normal, the plane's offset."""
     e, f, n, k = _normal(a, b, c)
-    return k, *n, _dot(n, a)
+    return k, *n, dot(n, a)
 
 
 def badouel(ray, triangle):
@@ -83,10 +72,10 @@ def badouel(ray, triangle):
     """
     k, n0, n1, n2, offset = triangle.data
     n = n0, n1, n2
-    along = _dot(n, ray.d)
+    along = dot(n, ray.d)
     if along == 0.0:
         return None
-    t = (offset - _dot(n, ray.o)) / along
+    t = (offset - dot(n, ray.o)) / along
     i, j = (k + 1) % 3, (k + 2) % 3
     a, b, c = triangle.a, triangle.b, triangle.c
     x0, y0 = ray.o[i] + t * ray.d[i] - a[i], ray.o[j] + t * ray.d[j] - a[j]
@@ -135,14 +124,14 @@ def baldwin_weber(ray, triangle):
 
 def edge_lines(a, b, c):
     """For the Plücker test: the lines of the three edges (direction, moment), the normal, the plane's offset."""
-    n = _cross(_sub(b, a), _sub(c, a))
-    lines = [x for p, q in ((b, c), (c, a), (a, b)) for x in (*_sub(q, p), *_cross(p, q))]
-    return *lines, *n, _dot(n, a)
+    n = cross(minus(b, a), minus(c, a))
+    lines = [x for p, q in ((b, c), (c, a), (a, b)) for x in (*minus(q, p), *cross(p, q))]
+    return *lines, *n, dot(n, a)
 
 
 def _side(d, m, e, g):
     """The permuted inner product of two lines: its sign says on which side one passes the other."""
-    return _dot(d, g) + _dot(m, e)
+    return dot(d, g) + dot(m, e)
 
 
 def plucker(ray, triangle):
@@ -165,7 +154,7 @@ def plucker(ray, triangle):
     det = u + v + w                                     # the normal times the direction
     if det == 0.0:
         return None
-    return (data[21] - _dot(data[18:21], ray.o)) / det, u / det, v / det
+    return (data[21] - dot(data[18:21], ray.o)) / det, u / det, v / det
 
 
 #: Name -> (what is calculated for a triangle beforehand, the test). The watertight test is Triangle's own.

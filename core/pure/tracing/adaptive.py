@@ -2,7 +2,7 @@
 
 import math
 
-from ...adaptive import ACROSS, DEPTHS, FIRST, OWN, SPENT, Adaptive
+from ...adaptive import ACROSS, DEPTHS, FIRST, OWN, SPENT, Adaptive, ByVariance
 from . import sampling
 from .camera import through
 from .vectors import add, mul, times
@@ -108,36 +108,24 @@ class Corners(Counted):
         return whole_pixel and (len(set(things)) > 1 or max(depths) > DEPTHS * min(depths))
 
 
-class Variance(Counted):
-    """Pixels get more samples as long as that makes the picture better by as much as elsewhere.
-
-    The samples are those of uniform sampling; with n of them a pixel gets as many again if its standard error, as
-    displayed, is above threshold * n / FIRST * sqrt(rays of a sample there / rays of a sample on average). Then a ray
-    more takes about as much from the picture's squared error everywhere (Neyman's allocation, 1934; stratified samples
-    err less, the more they are, than their variance tells).
-
-    In the variance the 3 x 3 pixels around have a part, and so has what their means differ by: few samples of its own
-    may all miss an edge, and to stop where they happen to agree would make a bias.
-    """
+class Variance(Counted, ByVariance):
+    """More samples where they take most from the error."""
 
     def parts(self, order):
         """See :class:`Adaptive`."""
         x0, y0, x1, y1 = self.region
-        most = 4**self.level
-        begin = min(max(self.samples, FIRST), most)
         everywhere = [(x, y) for y in range(y0, y1) for x in range(x0, x1)]
         #: Pixel -> number of samples, their sum, the sum of their squares.
         self.state = {pixel: (0, (0.0,) * 3, (0.0,) * 3) for pixel in everywhere}
         self.rays = dict.fromkeys(everywhere, 0)
-        rounds = 1 + math.ceil(math.log2(most / begin))
-        for turn in range(rounds):
+        for turn in range(self.rounds):
             if turn == 0:
-                more = dict.fromkeys(everywhere, begin)
+                more = dict.fromkeys(everywhere, self.begin)
             else:
                 variances = {pixel: self._variance(pixel) for pixel in everywhere}
                 cost = sum(self.rays[pixel] / self.state[pixel][0] for pixel in everywhere) / len(everywhere)
                 noisy = [pixel for pixel in everywhere if self._noisy(pixel, variances, cost)]
-                more = {pixel: min(self.state[pixel][0], most - self.state[pixel][0]) for pixel in noisy}
+                more = {pixel: min(self.state[pixel][0], self.most - self.state[pixel][0]) for pixel in noisy}
             for i, tile in enumerate(order):
                 out, combined, worked = {}, [], False
                 for y in range(tile[1], tile[3]):
@@ -149,7 +137,7 @@ class Variance(Counted):
                         n, total, _ = self.state[x, y]
                         combined.append(times(1.0 / n, total))
                 if worked:
-                    yield (turn + (i + 1) / len(order)) / rounds, tile, {**out, "combined": combined}, self._spent()
+                    yield (turn + (i + 1) / len(order)) / self.rounds, tile, {**out, "combined": combined}, self._spent()
 
     def _sampled(self, x, y):
         """Take a pixel's next sample; the passes that the first one gives."""
