@@ -40,8 +40,13 @@ import numpy as np
 from ..catalogue import Technique, build
 from ..errors import ParameterError, RayscopeError
 from ..parameters import resolve
-from . import report, stability, stress
+from . import report
 from .rays import ray_sets
+from .stability import cases
+from .stability.examine import differences
+from .stability.rays import Batch, corners_of, mixed_rays
+from .stability.scenes import random_soup
+from .stability.trial import asked, scene_and_rays, size_of
 
 #: Rays a case, and seconds that it may take.
 RAYS, SECONDS = 40, 20.0
@@ -152,33 +157,33 @@ def check(structure, core, path, scene=None, seed=0, seconds=SECONDS, say=lambda
 
 def _each_from_near(scene, rng, n):
     """A ray to the middle of every triangle, from just above it: none can be left out unnoticed."""
-    corners = stress.corners_of(scene)
+    corners = corners_of(scene)
     normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     normal /= np.linalg.norm(normal, axis=1, keepdims=True)
-    return stress.Batch(corners.mean(axis=1) + 1e-3 * normal, -normal)
+    return Batch(corners.mean(axis=1) + 1e-3 * normal, -normal)
 
 
 #: A case of our own, beside the stress suite's.
-EACH = stress.Case("every primitive", lambda rng: stress.random_soup(rng, WORK // 4), _each_from_near)
+EACH = cases.Case("every primitive", lambda rng: random_soup(rng, WORK // 4), _each_from_near)
 
 
 def _cases(core, scene, seed):
     """Names, scenes and rays: those of the stress suite, then the scene given."""
-    yield EACH.name, *stability.scene_and_rays(EACH, seed, RAYS)
-    for case in stress.cases():
+    yield EACH.name, *scene_and_rays(EACH, seed, RAYS)
+    for case in cases.cases():
         if core in case.cores and not case.instanced:
-            yield case.name, *stability.scene_and_rays(case, seed, RAYS)
+            yield case.name, *scene_and_rays(case, seed, RAYS)
     if scene is not None:
         for rays in ray_sets(scene, build(scene), RAYS, seed):
-            yield f"{scene.name}, {rays.kind} rays", scene, stress.Batch(rays.origins, rays.directions, t_max=rays.t_max)
+            yield f"{scene.name}, {rays.kind} rays", scene, Batch(rays.origins, rays.directions, t_max=rays.t_max)
 
 
 def _differences(found, made, scene, batch):
     """Count what differs in one case; the first ray that does, in words, else nothing."""
-    right = stability.asked(batch, build(scene, "brute", "pure"))
+    right = asked(batch, build(scene, "brute", "pure"))
     index = made(scene)
-    got = stability.asked(batch, index)
-    wrong, lost, ghost, _ = stability.differences(got, right, batch, stability.size_of(scene))
+    got = asked(batch, index)
+    wrong, lost, ghost, _ = differences(got, right, batch, size_of(scene))
     blocked = np.array(index.occluded(batch.o, batch.d, batch.t_min, batch.t_max), bool)
     shadow = blocked != (right.primitive >= 0)
     found.update(wrong=int(wrong.sum()), lost=int(lost.sum()), ghost=int(ghost.sum()), shadow=int(shadow.sum()))
@@ -200,8 +205,8 @@ def _differences(found, made, scene, batch):
 
 def _work(made, core, seed):
     """What it costs on a soup of triangles, beside brute force."""
-    case = stress.Case("work", lambda rng: stress.random_soup(rng, WORK), stress.mixed_rays)
-    scene, batch = stability.scene_and_rays(case, seed, WORK_RAYS)
+    case = cases.Case("work", lambda rng: random_soup(rng, WORK), mixed_rays)
+    scene, batch = scene_and_rays(case, seed, WORK_RAYS)
     table = {}
     for name, make in (("yours", made), ("brute", lambda scene: build(scene, "brute", core))):
         start = time.perf_counter()
@@ -209,7 +214,7 @@ def _work(made, core, seed):
         built = time.perf_counter()
         batch.ask(index)
         end = time.perf_counter()
-        hits = stability.asked(batch, index, count=True)
+        hits = asked(batch, index, count=True)
         table[name] = {"T_B": built - start, "T_R": end - built, "N_IT": float(hits.n_it.mean()), "N_TS": float(hits.n_ts.mean())}
     return table
 

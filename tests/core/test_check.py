@@ -30,8 +30,8 @@ def run(tmp_path, source, monkeypatch=None, names=("friendly", "many identical",
     path = tmp_path / "mine.py"
     path.write_text(source)
     if monkeypatch is not None:
-        some = [case for case in check.stress.cases() if case.name in names]
-        monkeypatch.setattr(check.stress, "cases", lambda: some)
+        some = [case for case in check.cases.cases() if case.name in names]
+        monkeypatch.setattr(check.cases, "cases", lambda: some)
     [(structure, core)] = check.load(path)
     return check.check(structure, core, path, **more)
 
@@ -90,8 +90,8 @@ def test_files_without_a_structure(tmp_path, source, words):
 def test_the_verb(tmp_path, capsys, monkeypatch):
     (tmp_path / "mine.py").write_text(EXAMPLE)
     (tmp_path / "other.py").write_text(WRONG["lost"][0])
-    some = check.stress.cases()[:1]
-    monkeypatch.setattr(check.stress, "cases", lambda: some)
+    some = check.cases.cases()[:1]
+    monkeypatch.setattr(check.cases, "cases", lambda: some)
     assert main(["check", str(tmp_path / "mine.py")]) == 0
     assert "2 of 2 cases as brute force" in capsys.readouterr().out
     assert main(["check", str(tmp_path / "other.py"), "--json"]) == 1

@@ -6,7 +6,7 @@ import pytest
 from rayscope.core import Camera, Light, Material, Mesh, Object, Scene, SceneError, Shapes, solids, trace
 from rayscope.core.command import main
 from rayscope.core.lab import inspect as inspecting
-from rayscope.core.lab import stress
+from rayscope.core.lab.stability import scenes
 
 CAMERA = Camera.look_at((0.0, -8.0, 1.0), (0.0, 0.0, 0.0))
 
@@ -19,7 +19,7 @@ def placed(name, mesh, at=(0, 0, 0), scale=1.0, **more):
 
 
 def ball(rows=8, seed=0):
-    return stress.ball(np.random.default_rng(seed), rows)
+    return scenes.ball(np.random.default_rng(seed), rows)
 
 
 def seen(objects, **more):
@@ -64,7 +64,7 @@ def test_slivers_and_diagonals():
     along = np.stack([rng.uniform(1, 2, 60), rng.uniform(1, 2, 60), rng.uniform(2, 3, 60)], axis=1)
     needles = np.stack([start, start + along, start + along + (0.004, 0, 0)], axis=1)
     blades = np.stack([start, start + along, start + along + (0.15, 0, 0)], axis=1) + (0.5, 0, 0)
-    scene = seen([Object("needles", stress.soup(needles).objects[0].geometry), Object("blades", stress.soup(blades).objects[0].geometry),
+    scene = seen([Object("needles", scenes.soup(needles).objects[0].geometry), Object("blades", scenes.soup(blades).objects[0].geometry),
                   placed("ball", ball(), (0, 3, 0))])
     result = inspecting.inspect(scene)
     assert ("slivers", "needles") in causes(result) and ("slivers", "ball") not in causes(result)

@@ -11,10 +11,19 @@ from rayscope.core import SceneError, build
 from rayscope.core.catalogue import technique
 from rayscope.core.command import main
 from rayscope.core.fast.query import Closest
-from rayscope.core.lab import stability, stability_pictures, stress, stress_pictures
+from rayscope.core.lab import stability
+from rayscope.core.lab.stability import examine as examining
+from rayscope.core.lab.stability import examine_pictures, plots, scenes, single, suite, sweeps
+from rayscope.core.lab.stability.cases import cases
+from rayscope.core.lab.stability.examine import examine
+from rayscope.core.lab.stability.pictures import pictures
+from rayscope.core.lab.stability.rays import corners_of
+from rayscope.core.lab.stability.spawned import spawned_inside
+from rayscope.core.lab.stability.trial import asked, built, scene_and_rays
+from rayscope.core.lab.stability.truth import truth
 
-CASES = {c.name: c for c in stress.cases()}
-PICTURES = {c.name: c for c in stress_pictures.pictures()}
+CASES = {c.name: c for c in cases()}
+PICTURES = {c.name: c for c in pictures()}
 RAYS = 18
 
 
@@ -31,8 +40,8 @@ def known():
 
 def given(known, case):
     if case.name not in known:
-        scene, batch = stability.scene_and_rays(case, 0, RAYS)
-        known[case.name] = scene, batch, stability.asked(batch, stability.built(case, scene, "brute", "pure"))
+        scene, batch = scene_and_rays(case, 0, RAYS)
+        known[case.name] = scene, batch, asked(batch, built(case, scene, "brute", "pure"))
     return known[case.name]
 
 
@@ -43,7 +52,7 @@ def test_brute_force_finds_what_is_exactly_there(case, known):
     for name in ("t", "primitive", "object"):
         assert len(getattr(hits, name)) == len(batch)
     picked = type(hits)(**{f: np.asarray(getattr(hits, f))[some] for f in ("t", "primitive", "object", "u", "v", "part", "normal", "point", "error")})
-    row = stability.truth(case, scene, batch.take(some), picked)
+    row = truth(case, scene, batch.take(some), picked)
     assert row["rays"] == len(some)
     assert not row["bad"], row
     assert row["off_surface"] <= 16.0
@@ -53,8 +62,8 @@ def test_brute_force_finds_what_is_exactly_there(case, known):
 @pytest.mark.parametrize("case", CASES.values(), ids=lambda c: c.name)
 def test_techniques_find_what_brute_force_finds(case, known):
     scene, batch, right = given(known, case)
-    rows = [stability.examine(case, scene, batch, right, name, core, 0, None, timed=False)
-            for name, core in stability.contestants() if turn(case.name, name, core) and stability.takes(name, case)]
+    rows = [examine(case, scene, batch, right, name, core, 0, None, timed=False)
+            for name, core in suite.contestants() if turn(case.name, name, core) and suite.takes(name, case)]
     assert len(rows) >= 20 and not [row for row in rows if row["verdict"] != "ok"]
     if batch.must == "hit":
         assert (right.primitive >= 0).all()
@@ -62,22 +71,22 @@ def test_techniques_find_what_brute_force_finds(case, known):
 
 @pytest.mark.parametrize("case", PICTURES.values(), ids=lambda c: c.name)
 def test_stiff_pictures_are_the_same_with_every_technique(case, monkeypatch):
-    monkeypatch.setattr(stability_pictures, "SLOW", math.inf)
-    own = [pair for pair in stability.contestants() if turn(case.name, *pair) and technique(pair[0]).ray_by_ray]
-    rows = stability_pictures.examined(case, 0, own, {}, {})
+    monkeypatch.setattr(examine_pictures, "SLOW", math.inf)
+    own = [pair for pair in suite.contestants() if turn(case.name, *pair) and technique(pair[0]).ray_by_ray]
+    rows = examine_pictures.examined(case, 0, own, {}, {})
     assert len(rows) >= 17 and not [row for row in rows if row["verdict"] != "ok"]
 
 
-@pytest.mark.parametrize("name", [name for name, core in stability.contestants() if core == "fast" and not technique(name).ray_by_ray])
+@pytest.mark.parametrize("name", [name for name, core in suite.contestants() if core == "fast" and not technique(name).ray_by_ray])
 def test_stiff_pictures_by_areas_have_no_more_light_than_there_is(name, monkeypatch):
-    monkeypatch.setattr(stability_pictures, "SLOW", math.inf)
+    monkeypatch.setattr(examine_pictures, "SLOW", math.inf)
     for case in PICTURES.values():
-        row, = stability_pictures.examined(case, 0, [(name, "fast")], {}, {})
+        row, = examine_pictures.examined(case, 0, [(name, "fast")], {}, {})
         assert row["verdict"] == "ok", row
 
 
 def test_stiff_pictures_are_what_they_say():
-    known = {name: stability_pictures.traced(PICTURES[name], 0, "bvh", "fast")[0] for name in PICTURES if PICTURES[name].furnace}
+    known = {name: examine_pictures.traced(PICTURES[name], 0, "bvh", "fast")[0] for name in PICTURES if PICTURES[name].furnace}
     assert np.allclose(known["facing mirrors"], 1.0 - 0.99**51, rtol=1e-6)
     # Beyond the critical angle all comes back to the block's other face; before it, a share leaves: none is lost.
     assert known["critical angle"].min() > 0.999
@@ -94,22 +103,22 @@ def test_stiff_pictures_are_what_they_say():
                                             (lambda p: p.__setitem__((3, 1), p[3, 1] - 1e-4), "1 wrong")])
 def test_a_wrong_picture_is_seen(spoil, verdict, monkeypatch):
     case = PICTURES["four tangent glass spheres"]
-    right, spent = stability_pictures.traced(case, 0, "bvh", "fast")
+    right, spent = examine_pictures.traced(case, 0, "bvh", "fast")
     picture = right.copy()
     spoil(picture)
-    monkeypatch.setattr(stability_pictures, "traced", lambda *_: (picture, spent))
-    assert verdict in stability_pictures.examine(case, 0, "bvh", "fast", right)["verdict"]
+    monkeypatch.setattr(examine_pictures, "traced", lambda *_: (picture, spent))
+    assert verdict in examine_pictures.examine(case, 0, "bvh", "fast", right)["verdict"]
 
 
 def test_cases_are_what_they_say():
-    assert len(CASES) == len(stress.cases()) > 25 and len(stress.cases(full=True)) > 55
-    scene, batch = stability.scene_and_rays(CASES["concave closed mesh"], 0, RAYS)
+    assert len(CASES) == len(cases()) > 25 and len(cases(full=True)) > 55
+    scene, batch = scene_and_rays(CASES["concave closed mesh"], 0, RAYS)
     index = build(scene, "bvh")
-    rays, start = stability._spawned_inside(index, CASES["concave closed mesh"], scene, None, batch, 0, "fast")
+    rays, start = spawned_inside(index, CASES["concave closed mesh"], scene, None, batch, 0, "fast")
     assert len(rays) > RAYS and (start >= 0).all()
     radius = np.linalg.norm(scene.objects[0].geometry.vertices, axis=1)
     assert radius.min() < 0.5 < 0.9 < radius.max()
-    corners = stress.corners_of(CASES["slivers 1e6"].make(np.random.default_rng(0)))
+    corners = corners_of(CASES["slivers 1e6"].make(np.random.default_rng(0)))
     edges = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2)
     assert (edges.max(axis=1) / edges.min(axis=1)).min() > 1e4
 
@@ -156,19 +165,19 @@ def shift(hits, hit, missed):
 def test_what_is_wrong_is_seen(spoil, column, known, monkeypatch):
     case = CASES["friendly"]
     scene, batch, right = given(known, case)
-    build_it = stability.built
-    monkeypatch.setattr(stability, "built", lambda *arguments, **more: Spoilt(build_it(*arguments, **more), spoil))
-    row = stability.examine(case, scene, batch, right, "bvh", "fast", 0, None, timed=False)
+    build_it = built
+    monkeypatch.setattr(examining, "built", lambda *arguments, **more: Spoilt(build_it(*arguments, **more), spoil))
+    row = examine(case, scene, batch, right, "bvh", "fast", 0, None, timed=False)
     assert row[column] == 1 and row["verdict"] != "ok" and len(row["bad"]) == 1
 
 
 def test_a_failing_case_is_written_and_replayed(tmp_path, known, monkeypatch, capsys):
     case = CASES["friendly"]
     scene, batch, right = given(known, case)
-    row = stability.examine(case, scene, batch, right, "grid", "fast", 0, None, timed=False) | {"bad": [3, 5], "verdict": "made up"}
+    row = examine(case, scene, batch, right, "grid", "fast", 0, None, timed=False) | {"bad": [3, 5], "verdict": "made up"}
     path = tmp_path / "case.json"
     path.write_text(json.dumps(stability.failure(row, 0, False)))
-    monkeypatch.setattr(stability, "SLOW", math.inf)
+    monkeypatch.setattr(examining, "SLOW", math.inf)
     result = stability.replay(path)
     assert [r["number"] for r in result["rays"]] == [3, 5] and not result["failed"]
     for ray in result["rays"]:
@@ -184,15 +193,15 @@ def test_a_failing_case_is_written_and_replayed(tmp_path, known, monkeypatch, ca
         stability.replay(path)
     path.write_text("{}")
     assert main(["stability", "--replay", str(path)]) == 2
-    row, = stability_pictures.examined(PICTURES["critical angle"], 0, [("grid", "fast")], {}, {})
+    row, = examine_pictures.examined(PICTURES["critical angle"], 0, [("grid", "fast")], {}, {})
     path.write_text(json.dumps(stability.failure(row, 0, False)))
     assert stability.replay(path)["row"]["case"] == "critical angle" and main(["stability", "--replay", str(path)]) == 0
 
 
 def test_the_verb(tmp_path, monkeypatch, capsys):
-    monkeypatch.setattr(stability, "mirror_times", lambda: [(1, 0.1, 16), (10, 0.2, 160)])
-    monkeypatch.setattr(stability, "drift", lambda walk: [(1, 0.5), (2, 0.6)])
-    monkeypatch.setattr(stability, "SLOW", math.inf)
+    monkeypatch.setattr(plots, "mirror_times", lambda: [(1, 0.1, 16), (10, 0.2, 160)])
+    monkeypatch.setattr(plots, "drift", lambda walk: [(1, 0.5), (2, 0.6)])
+    monkeypatch.setattr(examining, "SLOW", math.inf)
     assert main(["stability", "--small", "--techniques", "bvh", "--cases", "lost elsewhere,scale 1e8,critical angle", "--out", str(tmp_path), "--json"]) == 0
     record = json.loads(capsys.readouterr().out)
     assert {r["case"] for r in record["rows"]} == {"friendly", "lost elsewhere", "scale 1e8"} and not record["failed"]
@@ -203,20 +212,20 @@ def test_the_verb(tmp_path, monkeypatch, capsys):
 
 def test_in_float32_nothing_is_lost_near_the_origin_and_what_is_far_away_is_warned_of():
     pytest.importorskip("embreex")
-    rows = stability.single_precision([c for c in stress.cases(full=True) if c.name in ("distance 1e1", "distance 1e5", "distance 1e6", "distance 1e8")], 0)
+    rows = single.single_precision([c for c in cases(full=True) if c.name in ("distance 1e1", "distance 1e5", "distance 1e6", "distance 1e8")], 0)
     found = {row["case"]: row for row in rows if row["technique"] == "embree"}
     for name in ("distance 1e1", "distance 1e5"):
-        assert found[name]["lost"] == 0 and 0.01 < found[name]["t_error32"] <= stability.T_BOUND32 and not found[name]["warned"]
+        assert found[name]["lost"] == 0 and 0.01 < found[name]["t_error32"] <= single.T_BOUND32 and not found[name]["warned"]
     assert found["distance 1e6"]["warned"] and found["distance 1e8"]["warned"] and found["distance 1e8"]["lost"] > 0
     assert all(row["verdict"].startswith("ok") for row in rows)
 
 
 def test_a_run_that_was_stopped_goes_on(tmp_path, monkeypatch):
-    kept, asked, examine = tmp_path / "cases.jsonl", dict(names=["bvh"], only=["lost elsewhere", "critical angle"], kept=tmp_path / "cases.jsonl"), stability.examine
+    kept, asked, examine = tmp_path / "cases.jsonl", dict(names=["bvh"], only=["lost elsewhere", "critical angle"], kept=tmp_path / "cases.jsonl"), suite.examine
     whole = stability.run(**asked)
     kept.write_text("".join(kept.read_text().splitlines(keepends=True)[:2]) + '{"case": "lost else')   # stopped while it wrote
     done, said = [], []
-    monkeypatch.setattr(stability, "examine", lambda case, *more: done.append(case.name) or examine(case, *more))
+    monkeypatch.setattr(suite, "examine", lambda case, *more: done.append(case.name) or examine(case, *more))
     again = stability.run(**asked, resume=True, say=said.append)
     assert done == ["lost elsewhere"] * 2 and said[0] == "lost elsewhere (2 of 4)"
     same = lambda result: [(r["case"], r["technique"], r["core"], r["verdict"]) for k in ("rows", "truth", "pictures") for r in result[k]]
@@ -227,12 +236,12 @@ def test_a_run_that_was_stopped_goes_on(tmp_path, monkeypatch):
 
 @pytest.mark.parametrize("walk, most", [("exact", 2.0), ("add", 1000.0), ("subtract", 1000.0)])
 def test_drift_of_the_three_walks(walk, most):
-    errors = dict(stability.drift(walk, cells=400, rays=2))
+    errors = dict(sweeps.drift(walk, cells=400, rays=2))
     assert max(errors) == 400 and max(errors.values()) <= most
     if walk != "exact":                                                 # they do drift, by about a rounding a step
         assert max(errors.values()) > 5.0
 
 
 def test_two_mirrors_at_depth_1000():
-    (_, _, rays), (_, _, more) = stability.mirror_times((100, 1000))
+    (_, _, rays), (_, _, more) = sweeps.mirror_times((100, 1000))
     assert rays == 16 * 101 and more == 16 * 1001

@@ -1,15 +1,15 @@
-"""Stiff and extreme pictures, as data: what lights, mirrors and glass do at their limits. `stability_pictures` traces them."""
+"""Stiff and extreme pictures, as data: what lights, mirrors and glass do at their limits. `examine_pictures` traces them."""
 
 from dataclasses import dataclass
 
 import numpy as np
 
-from ..scene import solids
-from ..scene.camera import Camera
-from ..scene.light import Light
-from ..scene.material import Material, World
-from ..scene.scene import Mesh, Object, Scene, Shapes
-from .stress import ball, blocks, lit, nested_boxes, random_soup, tangent_spheres
+from ...scene import solids
+from ...scene.camera import Camera
+from ...scene.light import Light
+from ...scene.material import Material, World
+from ...scene.scene import Mesh, Object, Scene, Shapes
+from .scenes import ball, blocks, lit, nested_boxes, random_soup, tangent_spheres
 
 #: What glass and mirrors send on is all that comes in: in front of surroundings of 1 nothing is brighter than 1.
 WHITE = World((1.0, 1.0, 1.0), ambient=(0.0, 0.0, 0.0))

@@ -1,13 +1,13 @@
-"""The stiff pictures of `stress_pictures`, traced with every technique in both cores and held against brute force."""
+"""One technique on one stiff picture, against brute force's picture: pixels, light out of nothing, time."""
 
 import time
 import zlib
 
 import numpy as np
 
-from ..catalogue import ALL_RAYS, technique
-from ..errors import RayscopeError
-from ..rendering import Rendering
+from ...catalogue import ALL_RAYS, technique
+from ...errors import RayscopeError
+from ...rendering import Rendering
 
 COLUMNS = ("case", "technique", "core", "pixels", "wrong", "not_finite", "brightest", "seconds", "slow", "work", "verdict")
 #: Part of the picture's largest value by which a pixel may differ. Near the critical angle rounding counts as its root does.

@@ -1,0 +1,100 @@
+"""One technique on one case, against brute force: hits, leaks, rays that leave a surface, time."""
+
+import math
+import time
+
+import numpy as np
+
+from ...errors import MemoryEstimateError
+from .spawned import spawned_inside
+from .trial import EPSILON, T_BOUND, asked, built, lengths, size_of
+
+#: A case may take this many times the friendly case's time, unless its counters are as many times higher.
+SLOW = 10.0
+#: Times below this are the machine's, not ours: seconds.
+NOISE = 0.02
+#: Rays of a case that are timed.
+TIMED = {"pure": 24, "fast": 400}
+
+
+def differences(got, right, batch, size):
+    """Masks of rays: a wrong hit, none where there is one, one where there is none; and the largest error of t.
+
+    The error is in units of EPSILON * max(|t|, size of the scene). A different primitive at the same t is no error:
+    they are tied.
+    """
+    hit, expected = got.primitive >= 0, right.primitive >= 0
+    both = hit & expected
+    length = np.where(both, lengths(np.where(np.isfinite(batch.d), batch.d, 1.0)), 1.0)
+    t, t0 = np.where(both, got.t, 0.0) * length, np.where(both, right.t, 0.0) * length
+    with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
+        apart = np.abs(t - t0)
+        error = np.where(apart > 0.0, apart / (EPSILON * np.maximum(np.abs(t0), size)), 0.0)
+    return both & (error > T_BOUND / EPSILON), ~hit & expected, hit & ~expected, float(error.max(initial=0.0))
+
+
+def examine(case, scene, batch, right, name, core, seed, base, timed=True):
+    """One technique on one case.
+
+    Parameters
+    ----------
+    right : Hits
+        Brute force's.
+    base : dict or None
+        The same technique's `seconds` and `steps` on the friendly case.
+
+    Returns
+    -------
+    dict
+        A row of the table; `bad`: numbers of the rays that failed, `seconds`, `steps`.
+    """
+    row = {"case": case.name, "technique": name, "core": core, "rays": len(batch), "wrong": 0, "lost": 0, "ghost": 0, "leaks": 0, "self_hits": 0,
+           "t_error": 0.0, "bad": []}
+    try:
+        start = time.perf_counter()
+        index = built(case, scene, name, core)
+        row["T_B"] = time.perf_counter() - start
+        got = asked(batch, index, count=True)
+    except MemoryEstimateError as error:
+        return row | {"verdict": f"refused: {error}"}
+    wrong, lost, ghost, row["t_error"] = differences(got, right, batch, size_of(scene))
+    row.update(wrong=int(wrong.sum()), lost=int(lost.sum()), ghost=int(ghost.sum()))
+    bad = wrong | lost | ghost
+    if batch.must:
+        leaks = (got.primitive < 0) == (batch.must == "hit")
+        row["leaks"] = int(leaks.sum())
+        bad |= leaks
+    with np.errstate(over="ignore", invalid="ignore"):
+        blocked = np.asarray(index.occluded(batch.o, batch.d, t_min=batch.t_min, t_max=batch.t_max))
+    row["wrong"] += int((blocked != (right.primitive >= 0)).sum())
+    bad |= blocked != (right.primitive >= 0)
+    if case.closed:
+        rays, start = spawned_inside(index, case, scene, got, batch, seed, core)
+        again = asked(rays, index)
+        row["self_hits"] = int((again.primitive == start).sum())
+        row["leaks"] += int((again.primitive < 0).sum())
+    row["bad"] = np.flatnonzero(bad).tolist()
+    if timed and len(batch):
+        row |= _timed(index, batch, core, base)
+    failed = [f"{row[k]} {k.replace('_', '-')}" for k in ("wrong", "lost", "ghost", "leaks", "self_hits") if row[k]]
+    if row.get("slow") and row["slow"] > SLOW * max(1.0, row["work"]) and row["seconds"] > NOISE:
+        failed.append(f"{row['slow']:.0f} x slower with {row['work']:.1f} x the work")
+    return row | {"verdict": ", ".join(failed) or "ok"}
+
+
+def _timed(index, batch, core, base):
+    """Seconds for a fixed number of rays, the least of three; and the counters: mean and largest of a ray."""
+    rays = batch.take(np.resize(np.arange(len(batch)), TIMED[core]))
+    counted = asked(rays, index, count=True)
+    work = counted.n_it + counted.n_ts + 1
+    seconds = math.inf                                                  # of this thread: others may use the processor too
+    for _ in range(3):
+        start = time.thread_time()
+        with np.errstate(all="ignore"):
+            rays.ask(index)
+        seconds = min(seconds, time.thread_time() - start)
+    row = {"seconds": seconds, "steps": (float(work.mean()), float(work.max()))}
+    if base:
+        row["slow"] = seconds / base["seconds"]
+        row["work"] = max(a / b for a, b in zip(row["steps"], base["steps"]))
+    return row

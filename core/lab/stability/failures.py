@@ -1,0 +1,104 @@
+"""A failing case in a file, and that file run again."""
+
+import json
+import zlib
+from pathlib import Path
+
+import numpy as np
+
+from ...catalogue import technique
+from ...errors import SceneError
+from ...scene.scene import Mesh
+from .. import exact
+from .cases import cases
+from .examine import examine
+from .examine_pictures import examined
+from .pictures import pictures
+from .rays import Batch, corners_of
+from .trial import RAYS, asked, built, scene_and_rays
+from .truth import truth_row
+
+
+def failure(row, seed, full):
+    """What replays a failing row: the case by name and seed, its rays by their bits, what was found.
+
+    Returns
+    -------
+    dict
+    """
+    if row["case"] in {c.name for c in pictures()}:
+        return {k: row[k] for k in ("case", "technique", "core", "verdict", "bad")} | {"full": full, "seed": seed}
+    case = next(c for c in cases(full) if c.name == row["case"])
+    scene, batch = scene_and_rays(case, seed, RAYS[full])
+    rays = [{"number": r, "o": [x.hex() for x in batch.o[r].tolist()], "d": [x.hex() for x in batch.d[r].tolist()],
+             "t_min": batch.t_min[r].item().hex(), "t_max": batch.t_max[r].item().hex()} for r in row["bad"][:20]]
+    return {"case": case.name, "full": full, "seed": seed, "technique": row["technique"], "core": row["core"], "verdict": row["verdict"],
+            "scene": checksum(scene), "rays": rays}
+
+
+def checksum(scene):
+    """Of the numbers of a scene."""
+    parts = [p for o in scene.objects for p in (o.matrix, *((o.geometry.vertices, o.geometry.triangles) if isinstance(o.geometry, Mesh) else
+                                                             [s.matrix for s in o.geometry.solids if hasattr(s, "matrix")]))]
+    return zlib.crc32(b"".join(np.ascontiguousarray(p).tobytes() for p in parts))
+
+
+def replay(path, say=lambda line: None):
+    """Run a failing case again.
+
+    Parameters
+    ----------
+    path : path-like
+        A file that a run has written.
+
+    Returns
+    -------
+    dict
+        rays : list of dict with `number`, `brute` and `found` (t and primitive of each), `exact` t where the case has
+        one; row : the case's row as it is now; failed : bool.
+
+    Raises
+    ------
+    SceneError
+        When the file is none of ours, or the case has changed since.
+    """
+    try:
+        saved = json.loads(Path(path).read_text(encoding="utf-8"))
+        if saved["case"] in {c.name for c in pictures()}:
+            return _replayed_picture(saved)
+        case = next(c for c in cases(saved["full"]) if c.name == saved["case"])
+        rays = [[[float.fromhex(x) for x in ray[k]] for k in "od"] + [float.fromhex(ray[k]) for k in ("t_min", "t_max")] for ray in saved["rays"]]
+    except (ValueError, KeyError, TypeError, StopIteration):
+        raise SceneError(f"{path}: this is no failing case that `rayscope stability` has written; give one of the files in its folder failures.") from None
+    scene, batch = scene_and_rays(case, saved["seed"], RAYS[saved["full"]])
+    if checksum(scene) != saved["scene"]:
+        raise SceneError(f"{path}: the case {case.name!r} has changed since this was written; run `rayscope stability` again.")
+    say(f"{saved['technique']} ({saved['core']}) on {case.name}: was {saved['verdict']}")
+    brute, index = built(case, scene, "brute", "pure"), built(case, scene, saved["technique"], saved["core"])
+    lines, lists = [], corners_of(scene).tolist()
+    if rays:
+        some = Batch(*(np.array([r[k] for r in rays]) for k in range(4)), must=batch.must)
+        right, got = asked(some, brute), asked(some, index)
+        for k, ray in enumerate(saved["rays"]):
+            true = exact.nearest(*rays[k][:2], lists, *rays[k][2:]) if case.exact and lists and np.isfinite(some.o[k]).all() else None
+            lines.append({"number": ray["number"], "brute": (float(right.t[k]), int(right.primitive[k])),
+                          "found": (float(got.t[k]), int(got.primitive[k])), "exact": float(true[0]) if true else None})
+    right = asked(batch, brute)
+    friendly = next(c for c in cases(saved["full"]) if c.name == "friendly")
+    scene_f, batch_f = scene_and_rays(friendly, saved["seed"], RAYS[saved["full"]])
+    base = examine(friendly, scene_f, batch_f, asked(batch_f, built(friendly, scene_f, "brute", "pure")), saved["technique"], saved["core"],
+                   saved["seed"], None)
+    row = examine(case, scene, batch, right, saved["technique"], saved["core"], saved["seed"], base)
+    true = truth_row(case, scene, batch, right, saved["full"])
+    return {"rays": lines, "row": row, "truth": true, "failed": row["verdict"] != "ok" or true["verdict"] != "ok"}
+
+
+def _replayed_picture(saved):
+    """A failing picture again, and the friendly one, whose time it is compared with."""
+    case, friendly = next(c for c in pictures(saved["full"]) if c.name == saved["case"]), pictures()[0]
+    pace, known, pair = {}, {}, [(saved["technique"], saved["core"])]
+    if not technique(saved["technique"]).ray_by_ray:                    # held against the other core's
+        pair = [(saved["technique"], core) for core in technique(saved["technique"]).cores]
+    rows = [row for some in (friendly, case) for row in examined(some, saved["seed"], pair, pace, known)]
+    row = next(r for r in rows if (r["case"], r["core"]) == (case.name, saved["core"]))
+    return {"rays": [], "row": row, "truth": {"verdict": "ok"}, "failed": row["verdict"] != "ok"}
