@@ -6,6 +6,10 @@ import pytest
 from rayscope.core import Camera, Light, Material, Mesh, Object, Scene, SceneError, Shapes, solids, trace
 from rayscope.core.command import main
 from rayscope.core.lab import inspect as inspecting
+from rayscope.core.lab.inspect import inspection
+from rayscope.core.lab.inspect.costs import measure
+from rayscope.core.lab.inspect.remedies import halved, linked, united, with_mesh
+from rayscope.core.lab.inspect.shapes import own_corners, world_corners
 from rayscope.core.lab.stability import scenes
 
 CAMERA = Camera.look_at((0.0, -8.0, 1.0), (0.0, 0.0, 0.0))
@@ -33,7 +37,7 @@ def causes(result):
 def test_everything_is_booked():
     scene = seen([placed("left", ball(), (-1.2, 0, 0)), placed("right", ball(6), (1.2, 0, 0), materials=(Material(mirror=0.5),)),
                   Object("solid", Shapes([solids.sphere((0, 0, 2), 0.5)]))])
-    ledger, result = inspecting.measure(scene, size=(40, 30))
+    ledger, result = measure(scene, size=(40, 30))
     plain = trace(scene, size=(40, 30), count=True)
     assert ledger.tests.sum() == result.passes["n_it"].sum() == plain.passes["n_it"].sum()
     assert ledger.steps.sum() == pytest.approx(result.passes["n_ts"].sum())
@@ -90,15 +94,15 @@ def test_remedies_of_copies_and_of_overlaps():
     moved = Mesh(1.5 * same.vertices @ turn + (2.5, 0, 0), same.triangles)
     mirrored = Mesh(same.vertices * (-1.0, 1.0, 1.0) + (-2.5, 0, 0), same.triangles)
     scene = seen([placed("one", same), Object("moved", moved), Object("mirrored", mirrored)])
-    linked = inspecting.linked([0, 1, 2])(scene)
-    assert len({id(o.geometry) for o in linked.objects}) == 1
-    for before, after in zip(scene.objects, linked.objects):
-        assert np.allclose(*(inspecting.world_corners(o) for o in (before, after)), atol=1e-9)
+    shared = linked([0, 1, 2])(scene)
+    assert len({id(o.geometry) for o in shared.objects}) == 1
+    for before, after in zip(scene.objects, shared.objects):
+        assert np.allclose(*(world_corners(o) for o in (before, after)), atol=1e-9)
     copies = [f for f in inspecting.inspect(scene).findings if f.cause == "copies"]
     assert copies and copies[0].gain == pytest.approx(0.0, abs=0.05)      # they save memory
     pair = seen([placed("left", ball(16, 1), (-0.35, 0, 0)), placed("right", ball(16, 2), (0.35, 0, 0))])
-    corners = inspecting.own_corners(pair)
-    joined = inspecting.united(0, 1, corners)(pair)
+    corners = own_corners(pair)
+    joined = united(0, 1, corners)(pair)
     assert 0.5 < joined.n_primitives / pair.n_primitives < 0.9
     pictures = [trace(s, size=(24, 24)).passes["depth"] for s in (pair, joined)]
     assert (pictures[0] == pictures[1]).mean() > 0.98                   # what was inside is not missed
@@ -109,7 +113,7 @@ def test_remedies_of_copies_and_of_overlaps():
 def test_a_costly_picture_is_traced_smaller(monkeypatch):
     scene = seen([placed("one", ball())])
     usual = inspecting.inspect(scene)
-    monkeypatch.setattr(inspecting, "MOST_WORK", usual.work // 4)
+    monkeypatch.setattr(inspection, "MOST_WORK", usual.work // 4)
     smaller = inspecting.inspect(scene)
     assert 0.1 * usual.rays < smaller.rays < 0.5 * usual.rays and smaller.work < usual.work // 3
     assert smaller.rows[0]["object"] == "one"
@@ -117,10 +121,10 @@ def test_a_costly_picture_is_traced_smaller(monkeypatch):
 
 def test_a_remedy_keeps_the_picture():
     scene = seen([placed("one", ball())])
-    corners = inspecting.world_corners(scene.objects[0])
-    halved = inspecting._halved(corners, lambda c: np.ones(len(c), bool), 2)
-    assert len(halved) == 4 * len(corners)
-    pictures = [trace(s, size=(24, 24)).passes["depth"] for s in (scene, inspecting.with_mesh(0, halved)(scene))]
+    corners = world_corners(scene.objects[0])
+    twice = halved(corners, lambda c: np.ones(len(c), bool), 2)
+    assert len(twice) == 4 * len(corners)
+    pictures = [trace(s, size=(24, 24)).passes["depth"] for s in (scene, with_mesh(0, twice)(scene))]
     assert np.array_equal(np.isinf(pictures[0]), np.isinf(pictures[1]))
     assert np.allclose(*(np.nan_to_num(p, posinf=0.0) for p in pictures), atol=1e-5)
 
