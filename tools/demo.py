@@ -12,11 +12,11 @@ import numpy as np
 
 from rayscope.addon.open_file import open_file
 from rayscope.core import build, trace
-from rayscope.core.command import say, stoppable
 from rayscope.core.errors import RayscopeError
 from rayscope.core.image_file import save_png
 from rayscope.core.lab import report
 from rayscope.core.lab.compare import COLUMNS, compare, write
+from rayscope.core.outcome import say, stoppable
 
 ROOT = Path(__file__).resolve().parent.parent
 SIZE = (640, 360)
@@ -64,9 +64,8 @@ def demo(file, out):
     if note:
         say(note)
     record = report.record("demo", scene, 0, {"size": SIZE, "samples": SAMPLES, "rays": RAYS}, figures=result.figures, **compared)
-    (out / "demo.json").write_text(report.to_json(record) + "\n", encoding="utf-8")
     print("", report.table(compared["rows"], COLUMNS), sep="\n")
-    return [*written, *files, out / "demo.json"]
+    return [*written, *files, report.save(record, out)]
 
 
 def draw_structures(scene, image, out):

@@ -131,6 +131,13 @@ def folder(path):
     return path
 
 
+def save(record, path):
+    """Write a record into the folder `path` as VERB.json; returns the file's Path."""
+    file = Path(path) / f"{record['verb']}.json"
+    file.write_text(to_json(record) + "\n", encoding="utf-8")
+    return file
+
+
 def figure_class():
     """matplotlib's Figure, drawn without a window.
 

@@ -309,20 +309,20 @@ def test_the_view_that_is_added_sees_everything(size):
 
 @pytest.fixture
 def process(tmp_path):
-    """Starts python -m rayscope, which need not be installed."""
+    """Starts Python where rayscope can be imported, installed or not."""
     (tmp_path / "site").mkdir()
     (tmp_path / "site" / "rayscope").symlink_to(ROOT, target_is_directory=True)
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join([str(tmp_path / "site"), *sys.path])}
 
     def start(*argv):
-        return subprocess.Popen([sys.executable, "-m", "rayscope", *argv], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+        return subprocess.Popen([sys.executable, *argv], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
                                 env=environment, cwd=tmp_path)
     return start
 
 
 def test_as_a_process(process, tmp_path):
     def finished(*argv):
-        with process(*argv) as run:
+        with process("-m", "rayscope", *argv) as run:
             return *run.communicate(timeout=120), run.returncode
 
     out, err, code = finished("list", "--json")
@@ -333,7 +333,7 @@ def test_as_a_process(process, tmp_path):
 
 
 def test_a_reader_that_leaves_early_is_no_error(process):
-    with process("list") as run:
+    with process("-m", "rayscope", "list") as run:
         run.stdout.close()
         assert run.stderr.read() == "" and run.wait(60) == FAILED
 
@@ -342,4 +342,12 @@ def test_every_verb_has_help_and_json():
     parser = command.parser(with_file=True)
     for name, verb in VERBS.items():
         call = parser.parse_args([name, *(["x.blend"] if verb.scene else ["x.py"] if name == "check" else []), "--json"])
-        assert call.json and verb.help and verb.run.__doc__
+        assert call.json and verb.help
+
+
+def test_a_file_for_each_verb_that_only_its_call_imports(process):
+    assert {path.stem for path in (ROOT / "core" / "verbs").glob("*.py")} == set(VERBS)
+    code = ("import sys; from rayscope.core.command import main; main(['list']); "
+            "print(*(name for name in sys.modules if '.verbs.' in name or '.lab.' in name or '.fast' in name), file=sys.stderr)")
+    with process("-c", code) as run:
+        assert sorted(run.communicate(timeout=60)[1].split()) == ["rayscope.core.lab.report", "rayscope.core.verbs.list"]

@@ -1,0 +1,87 @@
+"""Times against mathutils and Embree; with an option, another table of the laboratory."""
+
+from dataclasses import replace
+from pathlib import Path
+
+from ..arguments import picture_size, seed, whole
+from ..errors import MissingPackageError
+from ..lab import against_brute, bench, directional, division, needs, report
+from ..outcome import DONE, FAILED, Outcome, say
+
+
+def options(sub):
+    sub.add_argument("--subdivisions", type=whole(0, 6), default=4,
+                     help="of the monkey; 4 gives 272k triangles with the ground")
+    sub.add_argument("--size", metavar="WxH", type=picture_size, default=(512, 512), help="primary rays")
+    sub.add_argument("--repeats", type=whole(1, 100), default=5)
+    sub.add_argument("--seed", type=seed, default=0)
+    sub.add_argument("--growth", action="store_true", help="also how times grow from 1k to 1M triangles")
+    sub.add_argument("--division", action="store_true",
+                     help="instead: what divides space, against brute force, its walks, lists and regions; "
+                     "with --growth only how they grow, from 1k triangles on; --subdivisions 5: to 1M")
+    sub.add_argument("--directional", action="store_true",
+                     help="instead: what directional techniques gain, for rays of the camera, rays to a "
+                     "light, and the picture of the interior among the examples")
+    sub.add_argument("--automatic", action="store_true",
+                     help="instead: the automatic choice of techniques against each fixed one, on the "
+                     "procedural databases and the examples")
+
+
+def run(call):
+    if call.automatic:
+        return _automatic(call)
+    if call.directional:
+        return _directional(call)
+    if call.division:
+        return _division(call)
+    result = bench.bench(call.subdivisions, call.size, call.repeats, call.seed, say=say)
+    balls = against_brute.against_brute(min(max(call.subdivisions, 1), 4), call.size, min(call.repeats, 3), say=say)
+    result["against_brute"] = balls
+    result["failed"] |= call.subdivisions >= bench.FULL_SIZE and not balls["met"]
+    if call.growth:
+        result["growth"] = bench.growth(call.seed, say=say)
+    asked = {"subdivisions": call.subdivisions, "size": call.size, "repeats": call.repeats, "growth": call.growth}
+    record = report.record("bench", result.pop("scene"), call.seed, asked, **result)
+    text = f"{bench.text(record)}\n\n{against_brute.text(balls)}"
+    return Outcome(text, record, FAILED if result["failed"] else DONE)
+
+
+def _automatic(call):
+    size = tuple(min(side, 320) for side in call.size)
+    rows, missed = needs.benchmark(_examples(call, size), size, repeats=min(call.repeats, 3), say=say)
+    text = report.table(rows, list(rows[0]))
+    if missed:
+        best, bvh = needs.BARS
+        text += f"\n\nOver {best:.0%} slower than the best, or over {bvh:.0%} slower than bvh: {', '.join(missed)}."
+    record = report.record("bench", None, None, {"automatic": True, "size": size}, rows=rows, missed=missed)
+    return Outcome(text, record, FAILED if missed else DONE)
+
+
+def _directional(call):
+    size = (640, 480)
+    rooms = ((room, size) for room in _examples(call, size, "interior.blend"))
+    result = directional.directional(call.subdivisions, rooms, call.repeats, call.seed, say=say)
+    asked = {"directional": True, "subdivisions": call.subdivisions, "repeats": call.repeats}
+    record = report.record("bench", None, call.seed, asked, **result)
+    return Outcome(directional.text(result), record, DONE if result["met"] else FAILED)
+
+
+def _division(call):
+    size = tuple(min(side, 128) for side in call.size)
+    if call.growth:
+        result = {"growth": division.growth(range(call.subdivisions + 1), size, say)}
+    else:
+        result = division.division(call.subdivisions, size, say=say)
+    asked = {"division": True, "subdivisions": call.subdivisions, "size": size, "growth": call.growth}
+    record = report.record("bench", None, None, asked, **result)
+    return Outcome(division.text(result), record, DONE if result.get("met", True) else FAILED)
+
+
+def _examples(call, size, names="*.blend"):
+    """The scenes of example_blends, one after the other; none, and a line that says so, where they cannot be read."""
+    for path in sorted((Path(__file__).parents[2] / "example_blends").glob(names)):
+        try:
+            yield replace(call.open_in_blender(path, size), name=path.stem)
+        except MissingPackageError as error:
+            say(f"The examples are left out. {error}")
+            return
