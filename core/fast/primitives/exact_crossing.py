@@ -23,8 +23,30 @@ NEAR = 2.0**-16
 LOST, EXACT = 2.0**-97, 2.0**-62
 
 
-def refined(o, d, rows, t, low, high, deep):
-    """As :func:`~rayscope.core.scene.exact.refined`, for m hits.
+class Asked:
+    """What is asked of t of m pairs: whether it lies within the ray's ends, and where, unless any hit will do.
+
+    Parameters
+    ----------
+    t_min, t_far : ndarray, shape (m,)
+    any_hit : bool
+    """
+
+    def __init__(self, t_min, t_far, any_hit):
+        self.t_min, self.t_far, self.any_hit = t_min, t_far, any_hit
+
+    def take(self, which):
+        """Of some of the pairs."""
+        return Asked(self.t_min[which], self.t_far[which], self.any_hit)
+
+    def answered(self, least, most):
+        """Where it is enough to know that t is between `least` and `most`."""
+        outside = (most < self.t_min) | (least > self.t_far)
+        return outside | (least > self.t_min) & (most < self.t_far) if self.any_hit else outside
+
+
+def refined(o, d, rows, t, low, high, deep, asked):
+    """As :func:`~rayscope.core.scene.exact.refined`, for m hits; but where less tells what is asked, only as well as that takes.
 
     Parameters
     ----------
@@ -34,6 +56,7 @@ def refined(o, d, rows, t, low, high, deep):
         x, y, z of the first vertices, of the second, of the third.
     t, low, high : ndarray, shape (m,)
     deep : ndarray, shape (m,), bool
+    asked : Asked
 
     Returns
     -------
@@ -44,10 +67,9 @@ def refined(o, d, rows, t, low, high, deep):
         return np.array([exact.refined(*hit) for hit in zip(*(c.tolist() for c in columns))])
     found = np.empty(len(t))
     for which, function in ((~deep, nearby), (deep, crossings)):
-        if which.all():
-            found = function(o, d, rows, t)
-        elif which.any():
-            found[which] = function(o[:, which], d[:, which], rows[:, which], t[which])
+        if which.any():
+            within = low[which], high[which], asked.take(which)
+            found[which] = function(o[:, which], d[:, which], rows[:, which], t[which], *(within if function is crossings else ()))
     slack = 2.0**-50 * np.abs(t)
     return np.where((found >= low - slack) & (found <= high + slack), np.minimum(np.maximum(found, low), high), t)
 
@@ -77,16 +99,21 @@ def _dot(a, b):
     return a[0] + a[1] + a[2]
 
 
-def crossings(o, d, rows, t):
-    """Where lines cross the planes of triangles, right to the last place; NaN where they do not. t: about there."""
-    found, sure = _double(o, d, rows, t)
+def crossings(o, d, rows, t, low=0.0, high=0.0, asked=None):
+    """Where lines cross the planes of triangles, right to the last place; NaN where they do not. t: about there.
+
+    With `asked` not so exactly where it is surely between `low` and `high`, and that is enough to answer.
+    """
+    found, sure, off = _double(o, d, rows, t)
+    if asked is not None:
+        sure |= asked.answered(found - off, found + off) & (found - off >= low) & (found + off <= high)
     for i in np.flatnonzero(~sure):
         found[i] = exact.crossing(o[:, i].tolist(), d[:, i].tolist(), *rows[:, i].reshape(3, 3).tolist())
     return found
 
 
 def _double(o, d, rows, t):
-    """What :func:`crossings` returns, and where it is sure."""
+    """What :func:`crossings` returns, where that is sure, and by how much it may be off elsewhere (NaN: any)."""
     with np.errstate(all="ignore"):
         # Both edges at once, and both products of each kind: for few hits numpy's calls are what costs.
         edge, rest = difference(rows[3:].reshape(2, 3, -1), rows[:3])
@@ -107,7 +134,8 @@ def _double(o, d, rows, t):
         sure = (np.abs(off) < NEAR * size) & (steep > SURE * np.abs(d).max(axis=0))
         sure &= (lost[0] <= EXACT * size * steep) & (lost[1] <= EXACT / NEAR * steep)
         sure &= (np.abs(left - 0.5 * step) > 2.0 * EXACT * size) & (np.abs(left - 0.25 * step) > 2.0 * EXACT * size)
-        return found, sure
+        off = 2.0 * (lost[0] + lost[1] * np.abs(off)) / steep + 2.0**-50 * (np.abs(off) + np.abs(found))
+        return found, sure, np.where(steep > SURE * np.abs(d).max(axis=0), off, np.nan)
 
 
 def difference(a, b):

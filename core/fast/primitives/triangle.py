@@ -12,15 +12,15 @@ import numpy as np
 from ...scene.exact import ALLOWED, DOUBTFUL, collinear
 from ...scene.layout import mirrors, to_world
 from .cut import boxes_inside
-from .exact_crossing import refined
+from .exact_crossing import Asked, refined
 from .exact_edges import edge_functions
 
 #: gamma(7): relative error of a point interpolated from three vertices (Pharr et al., PBR 4th ed., 6.8.5).
 GAMMA_7 = 7 * 2.0**-53 / (1 - 7 * 2.0**-53)
 #: How far inscribed boxes stay away from edges, relative to the coordinates; 8 makes up for components instead of lengths.
 TRIM = 8 * 2.0**-40
-
-
+#: What t may be off by, five times what the roundings add up to: see :data:`~rayscope.core.scene.exact.ALLOWED`.
+LOST = 16.0 * 2.0**-52
 #: Pairs tested together: columns that stay in the cache.
 PAIRS = 8_192
 
@@ -83,16 +83,20 @@ class Triangles:
         """The corners of some triangles, shape (3, 3, m)."""
         return np.stack(self.rows(item)).reshape(3, 3, -1).transpose(1, 0, 2)
 
-    def intersect(self, rays, ray, item, t_far):
-        """Nearest hits of pairs; see the package's interface."""
+    def intersect(self, rays, ray, item, t_far, any_hit=False):
+        """Nearest hits of pairs; see the package's interface. With `any_hit` only which pairs hit."""
         if len(ray) > PAIRS:
-            parts = [self._hits(rays, ray[k:k + PAIRS], item[k:k + PAIRS], t_far) for k in range(0, len(ray), PAIRS)]
+            parts = [self._hits(rays, ray[k:k + PAIRS], item[k:k + PAIRS], t_far, any_hit) for k in range(0, len(ray), PAIRS)]
             for k, (pair, *_) in enumerate(parts):
                 pair += k * PAIRS
             return [np.concatenate(c) for c in zip(*parts)]
-        return self._hits(rays, ray, item, t_far)
+        return self._hits(rays, ray, item, t_far, any_hit)
 
-    def _hits(self, rays, ray, item, t_far):
+    def blocks(self, rays, ray, item, t_far):
+        """The pairs that hit; see the package's interface."""
+        return self.intersect(rays, ray, item, t_far, any_hit=True)[0]
+
+    def _hits(self, rays, ray, item, t_far, any_hit):
         """As :meth:`intersect`, all pairs at once."""
         main = rays.main or rays.main_of(ray)
         if main is not None:
@@ -153,12 +157,21 @@ class Triangles:
             distance = np.abs(t / sz)
             bound = seen * (ALLOWED * np.maximum(distance, self.size) - distance)
             some = np.flatnonzero(distance * area + loose > bound)
+            if len(some):
+                off = (LOST * np.abs(sz) * (distance + (distance * area + loose) / seen)).take(some)
+        ends = rays.t_min.take(hit_ray), t_far.take(hit_ray)
+        if len(some):
+            asked = Asked(*(end.take(some) for end in ends), any_hit)
+            open_ = ~asked.answered(t.take(some) - off, t.take(some) + off)
+            some, asked = some[open_], asked.take(open_)
         if len(some):
             at, z = hit_ray.take(some), [c.take(some) for c in z]
             low, high = np.minimum(np.minimum(z[0], z[1]), z[2]), np.maximum(np.maximum(z[0], z[1]), z[2])
             rows = self._flat.reshape(-1, 9).take(item.take(pair.take(some)), axis=0).T
-            t[some] = refined(rays.o.take(at, axis=1), rays.d.take(at, axis=1), rows, t.take(some), low, high, (loose > bound).take(some))
-        good = np.flatnonzero((t >= rays.t_min.take(hit_ray)) & (t <= t_far.take(hit_ray)) & np.isfinite(t))
+            t[some] = refined(rays.o.take(at, axis=1), rays.d.take(at, axis=1), rows, t.take(some), low, high, (loose > bound).take(some), asked)
+        good = np.flatnonzero((t >= ends[0]) & (t <= ends[1]) & np.isfinite(t))
+        if any_hit:
+            return [pair.take(good)]
         if len(good) < len(pair):
             pair, det, t, v, w = pair.take(good), det.take(good), t.take(good), v.take(good), w.take(good)
         v /= det

@@ -156,7 +156,7 @@ class Tested(Triangles):
         with np.errstate(all="ignore"):
             self.data = prepare(self.xyz[0:3], self.xyz[3:6], self.xyz[6:9])
 
-    def _hits(self, rays, ray, item, t_far):
+    def _hits(self, rays, ray, item, t_far, any_hit=False):
         with np.errstate(all="ignore"):
             t, u, v, met = self.test(rays, ray, self.rows(item), [row.take(item) for row in self.data])
         good = np.flatnonzero(met & (t >= rays.t_min.take(ray)) & (t <= t_far.take(ray)) & np.isfinite(t))
