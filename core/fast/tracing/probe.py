@@ -10,6 +10,8 @@ from ..rays import left, part
 
 #: Seconds that one piece may take: half of what a user may have to wait for the run to stop.
 PIECE = 0.08
+#: What takes more than this part of the time with half the rays takes it for its calls, not for its rays.
+CALLS = 0.7
 
 
 class Probe:
@@ -25,7 +27,7 @@ class Probe:
 
     def __init__(self, structure, check, count):
         self.structure, self.check, self.count = structure, check, count
-        self.piece = 4096
+        self.piece, self.least, self.long = 4096, 64, (0, 0.0)
 
     def closest(self, o, d, t_min, t_max, leaving=None):
         """Hits of rays given as columns."""
@@ -78,7 +80,10 @@ class Probe:
             answers.append(ask(slice(start, start + size)))
             took = time.thread_time() - began
             if took > PIECE:
-                self.piece = max(64, size // 2)
+                twice, before = self.long
+                if 2 * size == twice and took > CALLS * before:         # smaller pieces would only add to the work
+                    self.least = twice
+                self.piece, self.long = max(self.least, size // 2), (size, took)
             elif took < PIECE / 3 and n - start >= size:
                 self.piece = min(131_072, size * 2)
             start += size
