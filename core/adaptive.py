@@ -3,8 +3,6 @@
 What is judged are displayed values: 0 to 1, brighter than white is white, with a gamma of 2.
 """
 
-import math
-
 #: Corners whose depths differ by more than this ratio belong to different surfaces.
 DEPTHS = 1.1
 #: Samples of a pixel before its error is judged, at least.
@@ -12,6 +10,9 @@ FIRST = 4
 #: Parts in the variance of a pixel: its own, the rest being that of the 3 x 3 pixels around it; and that of their means.
 #: Tried on the examples still life and interior.
 OWN, ACROSS = 0.75, 0.05
+#: Twice the samples are not enough where the error is so many times what is put up with: it falls with the root of
+#: their number, and what is put up with rises with their number.
+FAR = 2.0**1.5
 #: Passes that are sums over all rays of a pixel.
 SPENT = ("rays_per_pixel", "n_it", "n_ts")
 
@@ -61,9 +62,10 @@ class ByVariance(Adaptive):
     """Pixels get more samples as long as that makes the picture better by as much as elsewhere.
 
     The samples are those of uniform sampling; with n of them a pixel gets as many again if its standard error, as
-    displayed, is above threshold * n / FIRST * sqrt(rays of a sample there / rays of a sample on average). Then a ray
-    more takes about as much from the picture's squared error everywhere (Neyman's allocation, 1934; stratified samples
-    err less, the more they are, than their variance tells).
+    displayed, is above threshold * n / FIRST * sqrt(rays of a sample there / rays of a sample on average), and three
+    times as many if it is so far above that twice the samples would not do. Then a ray more takes about as much from
+    the picture's squared error everywhere (Neyman's allocation, 1934; stratified samples err less, the more they are,
+    than their variance tells). All pixels are judged again until none gets any: what one finds, those around it learn.
 
     In the variance the 3 x 3 pixels around have a part, and so has what their means differ by: few samples of its own
     may all miss an edge, and to stop where they happen to agree would make a bias.
@@ -72,12 +74,9 @@ class ByVariance(Adaptive):
     ----------
     begin, most : int
         Samples of a pixel, at first and at most.
-    rounds : int
-        Times that samples are taken: each takes as many again as there are, at most.
     """
 
     def __init__(self, *arguments):
         super().__init__(*arguments)
         self.most = 4**self.level
         self.begin = min(max(self.samples, FIRST), self.most)
-        self.rounds = 1 + math.ceil(math.log2(self.most / self.begin))

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ...adaptive import ACROSS, DEPTHS, FIRST, OWN, SPENT, Adaptive, ByVariance
+from ...adaptive import ACROSS, DEPTHS, FAR, FIRST, OWN, SPENT, Adaptive, ByVariance
 from . import sampling
 from .whitted import WAVE
 
@@ -130,11 +130,10 @@ class Variance(ByVariance):
         shape = (y1 - y0, x1 - x0)
         n = np.zeros(shape, np.int64)
         total, squares, rays = np.zeros((*shape, 3)), np.zeros((*shape, 3)), np.zeros(shape)
-        for turn in range(self.rounds):
-            if turn == 0:
-                more = np.full(shape, self.begin)
-            else:
-                more = np.where(self._noisy(n, total, squares, rays), np.minimum(n, self.most - n), 0)
+        more, left = np.full(shape, self.begin), 1.0
+        while more.any():
+            # Each round has about half as many rays as the one before.
+            left *= 0.5
             for i, tile in enumerate(order):
                 part = np.s_[tile[1] - y0 : tile[3] - y0, tile[0] - x0 : tile[2] - x0]
                 if not more[part].any():
@@ -154,7 +153,8 @@ class Variance(ByVariance):
                 n[part] += more[part]
                 first = {name: np.concatenate(values) for name, values in first.items()}
                 first["combined"] = (total[part] / n[part][..., None]).reshape(-1, 3)
-                yield (turn + (i + 1) / len(order)) / self.rounds, tile, first, _joined(spent)
+                yield 1.0 - left * (2.0 - (i + 1) / len(order)), tile, first, _joined(spent)
+            more = np.minimum(n * self._worth(n, total, squares, rays), self.most - n)
 
     @staticmethod
     def _samples(n, more):
@@ -167,8 +167,8 @@ class Variance(ByVariance):
             w = which[part]
             yield py[w], px[w], n[py[w], px[w]] + within[part]
 
-    def _noisy(self, n, total, squares, rays):
-        """Who is worth as many samples again."""
+    def _worth(self, n, total, squares, rays):
+        """How many times the samples that they have the pixels shall get."""
         mean = total / n[..., None]
         variance = np.maximum(squares / n[..., None] - mean * mean, 0.0) * (n / (n - 1))[..., None]
         seen = np.minimum(mean, 1.0)
@@ -178,7 +178,9 @@ class Variance(ByVariance):
         # Either way: a pixel that is all white so far can only become darker.
         off = np.maximum(shown(mean + error) - shown(mean), shown(mean) - shown(mean - error))
         cost = rays / n
-        return (off > (self.threshold * n / FIRST * np.sqrt(cost / cost.mean()))[..., None]).any(axis=-1)
+        much = off.max(axis=-1)
+        allowed = self.threshold * n / FIRST * np.sqrt(cost / cost.mean())
+        return np.where(much > FAR * allowed, 3, np.where(much > allowed, 1, 0))
 
 
 def _mean_of_9(a):

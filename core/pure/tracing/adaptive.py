@@ -2,7 +2,7 @@
 
 import math
 
-from ...adaptive import ACROSS, DEPTHS, FIRST, OWN, SPENT, Adaptive, ByVariance
+from ...adaptive import ACROSS, DEPTHS, FAR, FIRST, OWN, SPENT, Adaptive, ByVariance
 from . import sampling
 from .camera import through
 from .vectors import add, mul, times
@@ -118,26 +118,27 @@ class Variance(Counted, ByVariance):
         #: Pixel -> number of samples, their sum, the sum of their squares.
         self.state = {pixel: (0, (0.0,) * 3, (0.0,) * 3) for pixel in everywhere}
         self.rays = dict.fromkeys(everywhere, 0)
-        for turn in range(self.rounds):
-            if turn == 0:
-                more = dict.fromkeys(everywhere, self.begin)
-            else:
-                variances = {pixel: self._variance(pixel) for pixel in everywhere}
-                cost = sum(self.rays[pixel] / self.state[pixel][0] for pixel in everywhere) / len(everywhere)
-                noisy = [pixel for pixel in everywhere if self._noisy(pixel, variances, cost)]
-                more = {pixel: min(self.state[pixel][0], self.most - self.state[pixel][0]) for pixel in noisy}
+        more, left = dict.fromkeys(everywhere, self.begin), 1.0
+        while any(more.values()):
+            # Each round has about half as many rays as the one before.
+            left *= 0.5
             for i, tile in enumerate(order):
                 out, combined, worked = {}, [], False
                 for y in range(tile[1], tile[3]):
                     for x in range(tile[0], tile[2]):
-                        for _ in range(more.get((x, y), 0)):
+                        for _ in range(more[x, y]):
                             worked = True
                             for name, value in self._sampled(x, y).items():
                                 out.setdefault(name, []).append(value)
                         n, total, _ = self.state[x, y]
                         combined.append(times(1.0 / n, total))
                 if worked:
-                    yield (turn + (i + 1) / len(order)) / self.rounds, tile, {**out, "combined": combined}, self._spent()
+                    fraction = 1.0 - left * (2.0 - (i + 1) / len(order))
+                    yield fraction, tile, {**out, "combined": combined}, self._spent()
+            variances = {pixel: self._variance(pixel) for pixel in everywhere}
+            cost = sum(self.rays[pixel] / self.state[pixel][0] for pixel in everywhere) / len(everywhere)
+            for pixel, (n, *_) in self.state.items():
+                more[pixel] = min(n * self._worth(pixel, variances, cost), self.most - n)
 
     def _sampled(self, x, y):
         """Take a pixel's next sample; the passes that the first one gives."""
@@ -154,11 +155,12 @@ class Variance(Counted, ByVariance):
         n, total, squares = self.state[pixel]
         return tuple(max(s / n - (t / n) ** 2, 0.0) * (n / (n - 1)) for s, t in zip(squares, total))
 
-    def _noisy(self, pixel, variances, cost):
-        """Whether it is worth as many samples again."""
+    def _worth(self, pixel, variances, cost):
+        """How many times the samples that it has a pixel shall get."""
         x, y = pixel
         near = [p for dy in (-1, 0, 1) for dx in (-1, 0, 1) if (p := (x + dx, y + dy)) in variances]
         n, total, _ = self.state[pixel]
+        much = 0.0
         for channel in range(3):
             mean = total[channel] / n
             seen = [min(self.state[p][1][channel] / self.state[p][0], 1.0) for p in near]
@@ -167,10 +169,9 @@ class Variance(Counted, ByVariance):
             variance = OWN * variances[pixel][channel] + (1.0 - OWN) * around + ACROSS * differ
             error = math.sqrt(variance / n)
             # Either way: a pixel that is all white so far can only become darker.
-            off = max(shown(mean + error) - shown(mean), shown(mean) - shown(mean - error))
-            if off > self.threshold * n / FIRST * math.sqrt(self.rays[pixel] / n / cost):
-                return True
-        return False
+            much = max(much, shown(mean + error) - shown(mean), shown(mean) - shown(mean - error))
+        allowed = self.threshold * n / FIRST * math.sqrt(self.rays[pixel] / n / cost)
+        return 3 if much > FAR * allowed else 1 if much > allowed else 0
 
 
 WAYS = {"corners": Corners, "variance": Variance}
