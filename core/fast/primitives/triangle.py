@@ -11,6 +11,7 @@ import numpy as np
 
 from ...scene.exact import ALLOWED, DOUBTFUL, collinear
 from ...scene.layout import mirrors, to_world
+from ..rays import taken
 from .cut import boxes_inside
 from .exact_crossing import Asked, refined
 from .exact_edges import edge_functions
@@ -23,6 +24,8 @@ TRIM = 8 * 2.0**-40
 LOST = 16.0 * 2.0**-52
 #: Pairs tested together: columns that stay in the cache.
 PAIRS = 8_192
+#: Least share of hits with which it is not worth to go on with these alone.
+WORTH = 0.75
 
 
 class Triangles:
@@ -103,80 +106,87 @@ class Triangles:
             # One order of the axes: whole triangles are fetched at once, and the shear is cheaper made anew.
             dx, dy, dz = (rays.d[k].take(ray) for k in main)
             sx, sy, sz = dx / dz, dy / dz, 1.0 / dz
-            ox, oy, oz = (rays.apex[k] for k in main) if rays.apex is not None else (rays.o[k].take(ray) for k in main)
-            corners = self._flat.reshape(-1, 9).take(item, axis=0).T
-            corners = [corners[k + vertex] for vertex in (0, 3, 6) for k in main]
+            rows = self._flat.reshape(-1, 9).take(item, axis=0).T
+            corners = np.empty(rows.shape)
+            if rays.apex is not None:
+                np.subtract(rows, np.array(rays.apex * 3)[:, None], out=corners)
+            else:
+                for axis, o in enumerate(rays.o):
+                    o = o.take(ray)
+                    for k in (axis, axis + 3, axis + 6):
+                        np.subtract(rows[k], o, out=corners[k])
+            x, y, z = ([corners[k + vertex] for vertex in (0, 3, 6)] for k in main)
         else:
             axes, origin, s = rays.shear
             sx, sy, sz = (c.take(ray) for c in s)
-            ox, oy, oz = (origin[a].take(ray) for a in range(3))
-            places = [axes[a].take(ray) + item * 9 for a in range(3)]
-            corners = [self._flat.take(place + vertex) for vertex in (0, 3, 6) for place in places]
-        x, y, z = [], [], []
-        for vertex in (0, 3, 6):
-            p, q, w = (corner - o for corner, o in zip(corners[vertex:], (ox, oy, oz)))
+            x, y, z = [], [], []
+            for axis, o, column in zip(axes, origin, (x, y, z)):
+                place, o = axis.take(ray) + item * 9, o.take(ray)
+                column += [self._flat.take(place + vertex) - o for vertex in (0, 3, 6)]
+        for p, q, w in zip(x, y, z):
             p -= sx * w
             q -= sy * w
-            x.append(p)
-            y.append(q)
-            z.append(w)
         u = x[2] * y[1] - y[2] * x[1]
         v = x[0] * y[2] - y[0] * x[2]
         w = x[1] * y[0] - y[1] * x[0]
         # All of one sign, zeros allowed.
-        pair = np.flatnonzero((np.minimum(np.minimum(u, v), w) >= 0.0) | (np.maximum(np.maximum(u, v), w) <= 0.0))
-        hit_ray = ray
-        if len(pair) < len(ray):
-            u, v, w, sz, hit_ray = u.take(pair), v.take(pair), w.take(pair), sz.take(pair), ray.take(pair)
+        inside = (np.minimum(np.minimum(u, v), w) >= 0.0) | (np.maximum(np.maximum(u, v), w) <= 0.0)
+        pair = None
+        if np.count_nonzero(inside) < WORTH * len(ray):
+            # Few: only these from here on.
+            pair, inside = np.flatnonzero(inside), True
+            u, v, w, sz, ray, item = (c.take(pair) for c in (u, v, w, sz, ray, item))
             x, y, z = ([column.take(pair) for column in axis] for axis in (x, y, z))
         det = u + v + w
         seen = np.abs(det)
         # Seen edge-on, or hardly a triangle: the edge functions are little but rounding errors.
         largest = [np.maximum(np.maximum(np.abs(a[0]), np.abs(a[1])), np.abs(a[2])) for a in (x, y)]
-        doubtful = np.flatnonzero(seen <= (6.0 * DOUBTFUL) * largest[0] * largest[1])
+        doubtful = np.flatnonzero((seen <= (6.0 * DOUBTFUL) * largest[0] * largest[1]) & inside)
         if len(doubtful):
             p, q = ([column.take(doubtful) for column in axis] for axis in (x, y))
             products = sum(np.abs(p[i] * q[j]) for i, j in ((2, 1), (1, 2), (0, 2), (2, 0), (1, 0), (0, 1)))
             some = np.flatnonzero(seen.take(doubtful) <= DOUBTFUL * products)
             doubtful, p, q = doubtful.take(some), *([column.take(some) for column in axis] for axis in (p, q))
             # No area to be hit, exactly: nothing needs to be calculated one by one.
-            flat = (p[0] == p[1]) & (p[1] == p[2]) | (q[0] == q[1]) & (q[1] == q[2]) | self._collinear(item.take(pair.take(doubtful)))
+            flat = (p[0] == p[1]) & (p[1] == p[2]) | (q[0] == q[1]) & (q[1] == q[2]) | self._collinear(item.take(doubtful))
             for column in (u, v, w, det):
                 column[doubtful[flat]] = 0.0
             doubtful = doubtful[~flat]
         if len(doubtful):
-            own, p, q = item.take(pair.take(doubtful)), *([column[~flat] for column in axis] for axis in (p, q))
+            own, p, q = item.take(doubtful), *([column[~flat] for column in axis] for axis in (p, q))
             exact = edge_functions(p, q, lambda i: self.xyz[:, own[i]].reshape(3, 3).tolist())
             for column, value in zip((u, v, w, det), (*exact, exact[0] + exact[1] + exact[2])):
                 column[doubtful] = value
         with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-            z = [sz * c for c in z]                                     # t of the vertices
+            for c in z:
+                c *= sz                                                 # t of the vertices
             t = (u * z[0] + v * z[1] + w * z[2]) / det
             # Seen at a grazing angle, or narrow: t may be off by more than is allowed.
-            area, loose = (column.take(item.take(pair)) for column in self.rounding)
+            area, loose = (column.take(item) for column in self.rounding)
             distance = np.abs(t / sz)
             bound = seen * (ALLOWED * np.maximum(distance, self.size) - distance)
-            some = np.flatnonzero(distance * area + loose > bound)
+            some = np.flatnonzero((distance * area + loose > bound) & inside)
+            v /= det
+            w /= det
             if len(some):
                 off = (LOST * np.abs(sz) * (distance + (distance * area + loose) / seen)).take(some)
-        ends = rays.t_min.take(hit_ray), t_far.take(hit_ray)
+        ends = rays.t_min.take(ray), t_far.take(ray)
         if len(some):
             asked = Asked(*(end.take(some) for end in ends), any_hit)
             open_ = ~asked.answered(t.take(some) - off, t.take(some) + off)
             some, asked = some[open_], asked.take(open_)
         if len(some):
-            at, z = hit_ray.take(some), [c.take(some) for c in z]
+            at, z = ray.take(some), [c.take(some) for c in z]
             low, high = np.minimum(np.minimum(z[0], z[1]), z[2]), np.maximum(np.maximum(z[0], z[1]), z[2])
-            rows = self._flat.reshape(-1, 9).take(item.take(pair.take(some)), axis=0).T
-            t[some] = refined(rays.o.take(at, axis=1), rays.d.take(at, axis=1), rows, t.take(some), low, high, (loose > bound).take(some), asked)
-        good = np.flatnonzero((t >= ends[0]) & (t <= ends[1]) & np.isfinite(t))
+            rows = self._flat.reshape(-1, 9).take(item.take(some), axis=0).T
+            o, d = (taken(columns, at) for columns in (rays.o, rays.d))
+            t[some] = refined(o, d, rows, t.take(some), low, high, (loose > bound).take(some), asked)
+        good = np.flatnonzero((t >= ends[0]) & (t <= ends[1]) & np.isfinite(t) & inside)
         if any_hit:
-            return [pair.take(good)]
-        if len(good) < len(pair):
-            pair, det, t, v, w = pair.take(good), det.take(good), t.take(good), v.take(good), w.take(good)
-        v /= det
-        w /= det
-        return pair, t, v, w, np.zeros(len(pair), np.int64)
+            return [good if pair is None else pair.take(good)]
+        if len(good) < len(ray):
+            t, v, w = t.take(good), v.take(good), w.take(good)
+        return good if pair is None else pair.take(good), t, v, w, np.zeros(len(good), np.int64)
 
     @cached_property
     def size(self):
