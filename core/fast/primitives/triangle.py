@@ -166,10 +166,12 @@ class Triangles:
             distance = np.abs(t / sz)
             bound = seen * (ALLOWED * np.maximum(distance, self.size) - distance)
             some = np.flatnonzero((distance * area + loose > bound) & inside)
-            v /= det
-            w /= det
             if len(some):
-                off = (LOST * np.abs(sz) * (distance + (distance * area + loose) / seen)).take(some)
+                far, wide, lax, flat, scale = (column.take(some) for column in (distance, area, loose, seen, sz))
+                off = LOST * np.abs(scale) * (far + (far * wide + lax) / flat)
+            if not any_hit:
+                v /= det
+                w /= det
         ends = rays.t_min.take(ray), t_far.take(ray)
         if len(some):
             asked = Asked(*(end.take(some) for end in ends), any_hit)
