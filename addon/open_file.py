@@ -76,5 +76,8 @@ def _know_settings():
 
 
 def open_scene(size=None):
-    """The scene that is open, as :func:`open_file` returns it."""
-    return read_scene(bpy.context.evaluated_depsgraph_get(), size=size)
+    """The scene that is open, as :func:`open_file` returns it; it is called as its file is."""
+    scene = read_scene(bpy.context.evaluated_depsgraph_get(), size=size)
+    if bpy.data.filepath:
+        scene.name = Path(bpy.data.filepath).name
+    return scene

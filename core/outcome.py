@@ -40,18 +40,19 @@ def say(line):
 
 @contextlib.contextmanager
 def stoppable():
-    """A progress callback that prints lines now and then.
+    """A progress callback that prints a line now and then, when there is news.
 
     Ctrl+C makes it raise Cancelled, so that what is done can be kept.
     """
-    stopped, told = [], [time.monotonic()]
+    stopped, told, said = [], [time.monotonic()], [""]
 
     def progress(fraction):
         if stopped:
             raise Cancelled("stopped.")
-        if time.monotonic() - told[0] > INTERVAL:
-            told[0] = time.monotonic()
-            say(f"{100 * fraction:.0f} %")
+        line = f"{100 * fraction:.0f} %"
+        if line != said[0] and time.monotonic() - told[0] > INTERVAL:
+            told[0], said[0] = time.monotonic(), line
+            say(line)
 
     before = signal.signal(signal.SIGINT, lambda *_: stopped.append(True))
     try:

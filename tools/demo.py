@@ -3,6 +3,8 @@
     .venv/bin/python tools/demo.py [FILE.blend] [--out DIR]
 """
 import argparse
+import contextlib
+import os
 import sys
 import time
 from pathlib import Path
@@ -14,8 +16,7 @@ from rayscope.addon.open_file import open_file
 from rayscope.core import build, trace
 from rayscope.core.errors import RayscopeError
 from rayscope.core.image_file import save_png
-from rayscope.core.lab import report
-from rayscope.core.lab.compare import COLUMNS, compare, write
+from rayscope.core.lab import compare, report
 from rayscope.core.outcome import say, stoppable
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -57,14 +58,14 @@ def demo(file, out):
     save_png(out / "picture.png", result.image)
     written = [out / "picture.png", *draw_structures(scene, result.image, out)]
     say("comparing all techniques")
-    compared = compare(scene, n_rays=RAYS, say=say)
+    compared = compare.compare(scene, n_rays=RAYS, say=say)
     for line in compared["left_out"]:
         say(f"left out: {line}")
-    files, note = write(compared, out, f"{scene.name}: {scene.n_primitives} primitives")
+    files, note = compare.write(compared, out, f"{scene.name}: {scene.n_primitives} primitives")
     if note:
         say(note)
     record = report.record("demo", scene, 0, {"size": SIZE, "samples": SAMPLES, "rays": RAYS}, figures=result.figures, **compared)
-    print("", report.table(compared["rows"], COLUMNS), sep="\n")
+    print("", compare.text(compared), sep="\n")
     return [*written, *files, report.save(record, out)]
 
 
@@ -72,7 +73,8 @@ def draw_structures(scene, image, out):
     """overlay_NAME.png for each structure; nothing, and a line that says so, where this bpy cannot draw without a window."""
     try:
         import gpu
-        gpu.init()
+        with unheard():
+            gpu.init()
     except (AttributeError, SystemError, RuntimeError) as error:
         say(f"THE OVERLAY PICTURES WERE NOT DRAWN: THEY NEED BPY 5.2 AND OPENGL (bpy {bpy.app.version_string}: {error})")
         return []
@@ -87,6 +89,19 @@ def draw_structures(scene, image, out):
         save_png(path, overlay.picture(pixels, texels, n, clip_matrix(scene.camera)))
         written.append(path)
     return written
+
+
+@contextlib.contextmanager
+def unheard():
+    """Without what C libraries print on stderr: EGL tells each of its tries, of which one succeeds."""
+    heard = os.dup(2)
+    with open(os.devnull, "w") as nowhere:
+        os.dup2(nowhere.fileno(), 2)
+    try:
+        yield
+    finally:
+        os.dup2(heard, 2)
+        os.close(heard)
 
 
 def clip_matrix(camera):

@@ -76,13 +76,23 @@ def all_that_fit(scene, cores, n_rays):
             if core not in row.cores:
                 continue
             seconds = scene.n_primitives * 3.0 * n_rays * TEST_SECONDS[core]
-            if not fits(row, scene):
+            if not row.ray_by_ray:
+                left_out.append(f"{row.name} ({core}): traces pictures by other things than rays, and rays by a bvh.")
+            elif not fits(row, scene):
                 left_out.append(f"{row.name}: takes only primitives of the kind {row.primitives}.")
             elif row.name == "brute" and seconds > BRUTE_SECONDS:
                 left_out.append(f"{row.name} ({core}): would take about {seconds:.0f} s; name it in --techniques to run it all the same.")
             else:
                 chosen.append(Contestant(row.name, core))
     return chosen, left_out
+
+
+def text(result):
+    """The table for people, and what its columns mean."""
+    return "\n".join([
+        report.table(result["rows"], COLUMNS), "", *(f"{c}: {figures.FIGURES[c]}" for c in COLUMNS if c in figures.FIGURES),
+        "differ: rays whose hit is not brute force's, of those checked; "
+        "differ_embree: whose hit is not Embree's (which computes in float32)"])
 
 
 def compare(scene, contestants=None, cores=("fast",), n_rays=10_000, seed=0, repeats=3, say=lambda line: None):

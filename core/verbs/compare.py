@@ -2,9 +2,7 @@
 
 from ..arguments import checked, seed, specification, whole
 from ..catalogue import CORES, technique
-from ..figures import FIGURES
-from ..lab import report
-from ..lab.compare import COLUMNS, Contestant, compare, write
+from ..lab import compare, report
 from ..outcome import DONE, FAILED, Outcome, say
 
 
@@ -25,24 +23,21 @@ def run(call):
         for spec in call.techniques.split(","):
             choice = specification(spec)
             within = [core for core in cores if core in technique(choice[0]).cores] or cores[:1]
-            contestants += [Contestant(choice[0], core, checked(choice, core)[1]) for core in within]
+            contestants += [compare.Contestant(choice[0], core, checked(choice, core)[1]) for core in within]
     if call.out:
         report.folder(call.out)
     scene = call.scene()
-    result = compare(scene, contestants, cores, call.rays, call.seed, say=say)
+    result = compare.compare(scene, contestants, cores, call.rays, call.seed, say=say)
     asked = {"techniques": call.techniques, "core": call.core, "rays": call.rays}
     record = report.record("compare", scene, call.seed, asked, **result)
     kinds = ", ".join(f"{n} {kind}" for kind, n in result["rays"].items())
     text = [f"{scene.name}: {scene.n_primitives} primitives; rays: {kinds}", "",
-            report.table(result["rows"], COLUMNS), "",
-            *(f"{c}: {FIGURES[c]}" for c in COLUMNS if c in FIGURES),
-            "differ: rays whose hit is not brute force's, of those checked; "
-            "differ_embree: whose hit is not Embree's (which computes in float32)"]
+            compare.text(result)]
     for line in result["left_out"]:
         say(f"left out: {line}")
     if call.out:
         title = f"{scene.name}: {scene.n_primitives} primitives, {sum(result['rays'].values())} rays"
-        files, note = write(result, call.out, title)
+        files, note = compare.write(result, call.out, title)
         text += ["", *(f"written: {f}" for f in (*files, report.save(record, call.out)))]
         if note:
             say(note)

@@ -142,7 +142,7 @@ def test_only_what_fits_runs():
     assert any("embree" in line for line in left_out)
     with pytest.raises(SceneError, match="embree takes only"):
         compare(scene, [Contestant("embree")], n_rays=10)
-    assert {c.name for c in lab.all_that_fit(room(), ("fast",), 100)[0]} == {t.name for t in techniques() if "fast" in t.cores}
+    assert {c.name for c in lab.all_that_fit(room(), ("fast",), 100)[0]} == {t.name for t in techniques() if "fast" in t.cores and t.ray_by_ray}
 
 
 def test_brute_force_is_left_out_where_it_would_take_too_long(monkeypatch):
