@@ -5,15 +5,16 @@ from pathlib import Path
 
 from ..arguments import picture_size, seed, whole
 from ..errors import MissingPackageError
-from ..lab import against_brute, bench, directional, division, needs, report
+from ..lab import against_brute, antialiasing, bench, directional, division, needs, report
 from ..outcome import DONE, FAILED, Outcome, say
 
 
 def options(sub):
     sub.add_argument("--subdivisions", type=whole(0, 6), default=4,
                      help="of the monkey; 4 gives 272k triangles with the ground")
-    sub.add_argument("--size", metavar="WxH", type=picture_size, default=(512, 512), help="primary rays")
-    sub.add_argument("--repeats", type=whole(1, 100), default=5)
+    sub.add_argument("--size", metavar="WxH", type=picture_size,
+                     help="primary rays; without it 512x512, for --adaptive 128x96")
+    sub.add_argument("--repeats", type=whole(1, 100), default=5, help="of everything; for --adaptive: seeds")
     sub.add_argument("--seed", type=seed, default=0)
     sub.add_argument("--growth", action="store_true", help="also how times grow from 1k to 1M triangles")
     sub.add_argument("--division", action="store_true",
@@ -25,9 +26,15 @@ def options(sub):
     sub.add_argument("--automatic", action="store_true",
                      help="instead: the automatic choice of techniques against each fixed one, on the "
                      "procedural databases and the examples")
+    sub.add_argument("--adaptive", action="store_true",
+                     help="instead: error, rays and time of adaptive antialiasing against 16 uniform samples, "
+                     "on the examples")
 
 
 def run(call):
+    if call.adaptive:
+        return _adaptive(call)
+    call.size = call.size or (512, 512)
     if call.automatic:
         return _automatic(call)
     if call.directional:
@@ -44,6 +51,13 @@ def run(call):
     record = report.record("bench", result.pop("scene"), call.seed, asked, **result)
     text = f"{bench.text(record)}\n\n{against_brute.text(balls)}"
     return Outcome(text, record, FAILED if result["failed"] else DONE)
+
+
+def _adaptive(call):
+    size = call.size or (128, 96)
+    result = antialiasing.antialiasing(_examples(call, size), size, call.repeats, call.seed, say=say)
+    record = report.record("bench", None, call.seed, {"adaptive": True, "size": size, "repeats": call.repeats}, **result)
+    return Outcome(antialiasing.text(result), record, FAILED if result["missed"] else DONE)
 
 
 def _automatic(call):
