@@ -88,7 +88,7 @@ GRID = (
     Parameter("rule", "woo", "Cells for a density: cubic, fewer in flat scenes (woo); equally many along each axis; cubic, always as many",
               choices=("woo", "regular", "heterogeneous")),
     # In numpy an empty cell costs little, for blocks of them are leapt; a test costs much.
-    Parameter("density", {"pure": 4.0, "fast": 32.0}, "Cells per primitive", low=1e-3, high=1000.0),
+    Parameter("density", {"pure": 4.0, "fast": 32.0}, "Cells per primitive", low=1e-3, high=1000.0, depends=("resolution", 0)),
     Parameter("resolution", 0, "Cells along the longest axis; 0 means by density", low=0, high=4096),
 )
 WALKS = ("root", "intervals", "links", "heap")
@@ -96,7 +96,8 @@ WALK_HELP = ("How the next cell is found: from the root each time; by cutting th
              "depth first with a heap")
 STOPS = ("depth", "memory", "cost")
 STOP_HELP = "When cells are divided no more: by depth and number of primitives; when max_bytes are used; where it does not pay"
-MAX_BYTES = Parameter("max_bytes", 64e6, "With stop = memory: cells are divided until so much is used", low=1e3, high=1e12, unit="bytes")
+MAX_BYTES = Parameter("max_bytes", 64e6, "With stop = memory: cells are divided until so much is used", low=1e3, high=1e12,
+                      unit="bytes", depends=("stop", "memory"))
 
 WALK = Parameter("walk", "depth-first", "Which of the nodes that wait a ray enters next: the nearest child; the nearest of all, from a heap",
                  choices=("depth-first", "best-first"))
@@ -117,8 +118,8 @@ TECHNIQUES = (
                   Parameter("builder", {"pure": "sah", "fast": "ploc"}, "How the tree is built",
                             choices=("incremental", "sah", "sweep", "median", "lbvh", "ploc")),
                   Parameter("order", "shuffled", "In which order the incremental builder inserts: as in the scene, along a space-filling curve, at random",
-                            choices=("scene", "sorted", "shuffled")),
-                  Parameter("seed", 0, "Of the random order", low=0, high=2**31 - 1),
+                            choices=("scene", "sorted", "shuffled"), depends=("builder", "incremental")),
+                  Parameter("seed", 0, "Of the random order", low=0, high=2**31 - 1, depends=("builder", "incremental")),
                   Parameter("leaf_size", {"pure": 2, "fast": 1},
                             "A leaf holds at most this many primitives where it can be divided", low=1, high=1024),
                   WALK,
@@ -160,7 +161,7 @@ TECHNIQUES = (
                   Parameter("axes", 3, "Axes that are divided: all, or two (rows and columns)", low=2, high=3),
                   Parameter("intersect", "bits", "How lists are kept and intersected: as bit vectors, or as sorted lists",
                             choices=("bits", "sorted")),
-                  GRID[1], Parameter("density", 4.0, "Cells per primitive", low=1e-3, high=1000.0), GRID[3], MAILBOX,
+                  GRID[1], Parameter("density", 4.0, "Cells per primitive", low=1e-3, high=1000.0, depends=("resolution", 0)), GRID[3], MAILBOX,
               )),
     Technique("macro-grid", "Macro-Cell Grid", "subdivision", "macro_grid", "MacroGrid",
               "Devillers 1989; Sramek 1994",
@@ -191,7 +192,7 @@ TECHNIQUES = (
                   Parameter("split", "sah", "Where cells are divided: in the middle, the axes in turn; by the surface area heuristic",
                             choices=("middle", "sah")),
                   Parameter("clip", True, "Whether primitives are clipped to their cells (perfect splits)"),
-                  Parameter("empty_bonus", 0.2, "Part of the cost that is let off when a division cuts off empty space (SAH)", low=0.0, high=1.0),
+                  Parameter("empty_bonus", 0.2, "Part of the cost that is let off when a division cuts off empty space (SAH)", low=0.0, high=1.0, depends=("split", "sah")),
                   Parameter("stop", "cost", STOP_HELP, choices=STOPS),
                   Parameter("max_depth", 0, "Levels below the root, at most; 0 means 8 + 1.3 log2 N", low=0, high=64),
                   Parameter("leaf_size", 4, "A cell with more primitives is divided", low=1, high=1024),
@@ -203,7 +204,8 @@ TECHNIQUES = (
               parameters=(
                   Parameter("planes", "polygons", "Where planes come from: the planes of polygons; the medians along fixed directions",
                             choices=("polygons", "slabs")),
-                  Parameter("directions", 7, "With planes = slabs: axes, then a cube's diagonals, then those of its faces", low=3, high=13),
+                  Parameter("directions", 7, "With planes = slabs: axes, then a cube's diagonals, then those of its faces", low=3, high=13,
+                            depends=("planes", "slabs")),
                   Parameter("stop", "depth", STOP_HELP, choices=STOPS),
                   Parameter("max_depth", 0, "Levels below the root, at most; 0 means 8 + 1.3 log2 N", low=0, high=64),
                   Parameter("leaf_size", 4, "A cell with more primitives is divided", low=1, high=1024),
@@ -218,7 +220,8 @@ TECHNIQUES = (
               parameters=(
                   Parameter("faces", {"pure": "adaptive", "fast": "uniform"}, "How the direction cube's faces are divided: evenly, or as a quadtree",
                             choices=("uniform", "adaptive")),
-                  Parameter("z_buffer", False, "With uniform faces: full occluders are found with a z-buffer, and lists end behind them"),
+                  Parameter("z_buffer", False, "With uniform faces: full occluders are found with a z-buffer, and lists end behind them",
+                            depends=("faces", "uniform")),
                   Parameter("resolution", 0, "Cells along an edge of the direction cube; 0 means by the number of primitives", low=0, high=4096),
                   Parameter("max_bytes", 256e6, "Above it the buffers of lights not used for longest are given up", low=1e3, high=1e12, unit="bytes"),
               )),

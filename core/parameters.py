@@ -31,6 +31,8 @@ class Parameter:
         Unit of the value, ``""`` for a pure number.
     only : dict, optional
         ``{choice: core}`` for choices that one core alone offers.
+    depends : tuple, optional
+        ``(name, choice)``: it has an effect only where the parameter of that name has that value.
     inexact : tuple of str, optional
         Choices that are there to show what they get wrong: their hits may differ from the default's by rounding, and near edges
         by more. All others promise the same hits.
@@ -44,6 +46,7 @@ class Parameter:
     high: float | None = None
     unit: str = ""
     only: tuple = ()
+    depends: tuple = ()
     inexact: tuple = ()
 
     def default_in(self, core):

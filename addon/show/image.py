@@ -40,9 +40,10 @@ def put(pixels):
 
 
 def show(image):
-    """Show the image in an Image Editor, if one is open."""
+    """Show the image in an Image Editor, if one is open; whether one was."""
     for area in redraw.areas("IMAGE_EDITOR"):
         space = area.spaces.active
         if area.ui_type == "IMAGE_EDITOR" and not space.use_image_pin:
             space.image = image
-            return
+            return True
+    return False

@@ -164,16 +164,16 @@ class RAYSCOPE_OT_trace(Work, bpy.types.Operator):
     @staticmethod
     def _put(task):
         from ..show import image
-        image.show(image.put(task.result.image))
+        return image.show(image.put(task.result.image))
 
     def finish(self, task, job):
         if task.result is None:
             return "Tracing was stopped while the structure was built: the image is unchanged"
-        self._put(task)
+        where = "" if self._put(task) else ': see the image "Rayscope" in an Image Editor'
         task.keep()
         if job.cancelled:
-            return f"Tracing was stopped at {job.fraction:.0%}: the image keeps what was done"
-        return f"Traced {task.size[0]} x {task.size[1]} pixels in {job.seconds:.3g} s"
+            return f"Tracing was stopped at {job.fraction:.0%}, what was done is kept{where}"
+        return f"Traced {task.size[0]} x {task.size[1]} pixels in {job.seconds:.3g} s{where}"
 
 
 class RAYSCOPE_OT_cancel(bpy.types.Operator):

@@ -21,7 +21,9 @@ def draw_technique(layout, settings):
         group = settings.group()
         column = layout.column()
         for parameter in row.parameters:
-            column.prop(group, parameter.name)
+            line = column.row()
+            line.active = not parameter.depends or getattr(group, parameter.depends[0]) == parameter.depends[1]
+            line.prop(group, parameter.name)
 
 
 def _embree_found():
@@ -174,7 +176,7 @@ class Tracing:
             column.prop(fewer, "roulette")
         column.prop(settings, "count")
         if settings.row().ray_by_ray:
-            column = layout.column(heading="Rays")
+            column = layout.column()
             for kind in ("primary", "secondary", "shadow"):
                 column.prop(settings, kind)
 

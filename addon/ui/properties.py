@@ -41,7 +41,7 @@ def _kind(kind, rays):
     first = [("", "Choice", ""), ("chosen", "As Built", "The technique and parameters chosen under Structure, or a bounding volume hierarchy if that "
                                   f"technique does not serve {rays}", "NONE", 0),
              ("automatic", "Automatic", "What is expected to be fastest for this scene, by a cost model measured on this machine", "NONE", _number("automatic"))]
-    return EnumProperty(name=kind.title(), description=f"Technique for {rays}, with its default parameters", items=first + _techniques(kind), default="chosen")
+    return EnumProperty(name=f"{kind.title()} Rays", description=f"Technique for {rays}, with its default parameters", items=first + _techniques(kind), default="chosen")
 
 
 def _property(parameter, core):
@@ -53,6 +53,8 @@ def _property(parameter, core):
     if parameter.type is bool:
         return BoolProperty(**about)
     make = IntProperty if parameter.type is int else FloatProperty
+    if parameter.unit == "bytes":
+        about["precision"] = 0
     limits = {key: parameter.type(value) for key, value in (("min", parameter.low), ("max", parameter.high)) if value is not None}
     if parameter.type is int and parameter.high is not None:
         limits["max"] = min(limits["max"], 2**31 - 1)  # what Blender can hold

@@ -1,4 +1,5 @@
 """Unknown names and bad values are refused with what is possible; every declaration is sane."""
+import numpy as np
 import pytest
 from rayscope.core import ParameterError, Scene, build, technique, techniques
 from rayscope.core.parameters import Parameter, resolve
@@ -53,6 +54,22 @@ def test_declarations_are_complete(row):
                 assert p.low is not None and p.high is not None and p.low <= default <= p.high
             if p.type is str:
                 assert default in p.choices_in(core)
+
+
+IDLE = [(row, p) for row in techniques() for p in row.parameters if p.depends]
+
+
+@pytest.mark.parametrize("row, p", IDLE, ids=lambda value: value.name)
+def test_what_depends_on_another_parameter_has_no_effect_without_it(row, p):
+    name, wanted = p.depends
+    other = next(q for q in row.parameters if q.name == name)
+    without = {name: next(c for c in other.choices if c != wanted) if other.choices else other.high // 1000}
+    ends = p.choices_in("fast")[:2] if p.choices else (False, True) if p.type is bool else (p.low, min(p.high, 1000 * p.low + 10))
+    assert ends[0] != ends[1]
+    rng = np.random.default_rng(4)
+    scene = Scene.from_triangles(rng.uniform(-1, 1, (300, 3)), np.arange(300).reshape(-1, 3))
+    figures = [build(scene, row.name, **without, **{p.name: p.type(end)}).figures for end in ends]
+    assert {**figures[0], "T_B": 0} == {**figures[1], "T_B": 0}
 
 
 @pytest.mark.parametrize("given, value", [({"size": "7"}, 7), ({"size": 7.0}, 7), ({"ratio": 1}, 1.0), ({"mail": "true"}, True),
