@@ -16,6 +16,8 @@ class Built:
     index : core structure
     cells : Cells
         What an overlay draws.
+    technique : str
+        Its name.
     n_objects : int
         Objects in Blender's scene at the time.
     stale : bool
@@ -33,6 +35,7 @@ class Built:
     scene: object
     index: object
     cells: object
+    technique: str
     n_objects: int
     stale: bool = False
     pointed: int = -1

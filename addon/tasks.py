@@ -64,7 +64,7 @@ class Build:
         index = build(self.scene, self.choice["technique"], self.choice["core"], progress=lambda fraction: progress(0.95 * fraction),
                       **self.choice["parameters"])
         inspection.warn(self.uid, self.scene)
-        return session.Built(self.scene, index, index.cells(), self.n_objects)
+        return session.Built(self.scene, index, index.cells(), self.choice["technique"], self.n_objects)
 
 
 class Trace:

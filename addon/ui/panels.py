@@ -42,6 +42,11 @@ def draw_job(layout, operator, text, icon):
     row.operator("rayscope.cancel", text="", icon="X")
 
 
+def built_text(built):
+    """What is built: another technique may have been chosen since."""
+    return f"{built.technique}, before the scene changed" if built.stale else f"{built.technique}, {len(built.cells):,} cells"
+
+
 def draw_figures(layout, scene):
     """The figures as a table: name and value, the meaning as tooltip."""
     figures = session.figures_of(scene)
@@ -135,7 +140,7 @@ class Structure:
         built = session.built_of(context.scene)
         if built is not None:
             row = layout.row(align=True)
-            row.label(text="Scene changed since" if built.stale else f"{len(built.cells):,} cells", icon="ERROR" if built.stale else "CHECKMARK")
+            row.label(text=built_text(built), icon="ERROR" if built.stale else "CHECKMARK")
             row.operator("rayscope.clear", text="", icon="TRASH")
 
 

@@ -69,6 +69,8 @@ def test_build_fills_the_figures(scene):
     built = session.built_of(scene)
     assert figures.N == "12" and figures.T_B.endswith(" s") and figures.memory and figures.N_IT == ""
     assert len(built.cells) > 1 and built.cells.count[0] == 12 and not built.stale
+    scene.rayscope.technique = "grid"  # chosen, not built
+    assert panels.built_text(built) == f"bvh, {len(built.cells)} cells"
     assert panels._ends(built, "LEVEL") == (0.0, float(built.cells.level.max()))
     assert set(built.index.figures) <= set(FIGURES), "every figure of a build has a row in the table"
 
