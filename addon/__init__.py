@@ -3,9 +3,9 @@
 
 def _parts():
     """In the order of registration: operators and panels use the properties, and panels name the engine."""
-    from . import command, engine
+    from . import command, engine, user_files
     from .ui import add, error, findings, handlers, operators, outlines, panels, point, primitives, properties
-    return properties, primitives, engine, operators, point, add, panels, findings, error, handlers, outlines, command
+    return user_files, properties, primitives, engine, operators, point, add, panels, findings, error, handlers, outlines, command
 
 
 def register():

@@ -7,19 +7,23 @@ import numpy as np
 from .fast.rays import left, part
 from .hits import Hits
 
-#: Seconds that rays have taken before the first trial: before, one costs more than it can bring.
-START = 0.5
+#: Part of what rays will still take, about, that a trial and what is built for it may cost: whatever comes of it, little is lost.
+SHARE = 0.04
+#: Rays have taken so long before the first trial: then it is known what one takes. Seconds.
+START = 0.02
 #: The next trial comes when they have taken so many times as long.
 GROWTH = 4
-#: A structure is built when rays have taken so many times as long as that will take: whatever comes of it, little is lost.
-REPAID = 10.0
-#: Rays that each structure gets in the two heats of a trial, of the second if there are so many; it is for those that took no
-#: more than CLOSE times as long as the best in the first.
-HEATS, CLOSE = (256, 2048), 4.0
+#: Of rays that came, so many times as many are thought to come yet, if more came than were expected.
+LASTING = 0.5
+#: Rays that each structure gets in the second heat of a trial, at least and at most; the first has an eighth of them. The second
+#: is for those that took no more than CLOSE times as long as the best in the first.
+LEAST, MOST, FIRST_HEAT, CLOSE = 512, 2048, 8, 4.0
+#: A structure on trial takes so many times as long as the leader, about: what a trial will cost.
+SLOWER = 2.0
 #: Neighbouring rays that go to the same structure in a trial: as many as are traced well together.
 BLOCK = 64
-#: Rays asked before the first trial: some techniques make their lists when the first rays come.
-FIRST = 32
+#: Rays that a new structure is asked before its trial: some techniques make their lists when the first rays come.
+WARM = 32
 
 
 class Contest:
@@ -28,8 +32,8 @@ class Contest:
     In a trial blocks of neighbouring rays go to each in turn, so that all have the same kind of rays, from the same places
     and at the same moment. As numpy's calls take the same time for few rays as for many, two heats tell what a batch takes
     and what a ray takes. All other rays go to the structure that is the quickest with so many. Trials come when there were
-    many rays, and then ever more seldom, so the slower structures get a small part of the picture, which is no part lost:
-    their answers are the same.
+    many rays to come, and then ever more seldom, so the slower structures get a small part of the picture, which is no part
+    lost: their answers are the same.
 
     Parameters
     ----------
@@ -38,7 +42,7 @@ class Contest:
     others : list of (callable, float)
         What builds another one, and the seconds that this is thought to take.
     expected : int
-        Rays that will come, about: when more than half of them came there are no more trials.
+        Rays that will come, about.
     """
 
     def __init__(self, structure, others, expected):
@@ -55,7 +59,7 @@ class Contest:
     @property
     def leader(self):
         """The structure that answers most rays."""
-        return self.structures[self._quickest(HEATS[-1])]
+        return self.structures[self._quickest(MOST)]
 
     @property
     def technique(self):
@@ -108,7 +112,7 @@ class Contest:
         """Answers of n rays, and the order that they are to be brought into; None where there is one answer."""
         start = time.thread_time()                                          # not the clock: others may use the processor too
         parts, answers, done = [], [], 0
-        if self.seconds >= self._due and 2 * self.seen < self.expected:
+        if self.seconds >= self._due and self.seen:
             parts, answers, done = self._trial(n, ask, light)
         answers.append(ask(self.asked(self._quickest(n), light), slice(done, n) if done else slice(None)))
         self.seen += n
@@ -117,26 +121,40 @@ class Contest:
             return answers, None
         return answers, np.argsort(np.concatenate([*parts, np.arange(done, n)]))
 
+    def _entered(self, n):
+        """Who takes part in a trial among n rays: what is to be built, and how many rays each gets in the second heat."""
+        ray = self.seconds / self.seen
+        left = SHARE * ray * max(self.expected - self.seen, LASTING * self.seen)
+        own = SLOWER * LEAST * ray
+        left -= own * (len(self.structures) - 1)
+        pays = []
+        for other in self.others:
+            if other[1] + own <= left:
+                pays.append(other)
+                left -= other[1] + own
+        k = len(self.structures) + len(pays)
+        if k < 2 or left < 0.0:
+            return [], 0
+        return pays, int(min(LEAST + left / (SLOWER * k * ray), MOST, n // (2 * k)))
+
     def _trial(self, n, ask, light):
         """Ask all some of n rays: the numbers of these, the answers, and how many they are."""
-        pays = [build for build, seconds in self.others if REPAID * seconds <= self.seconds]
-        k = len(self.structures) + len(pays)
-        heats = HEATS[0], min(HEATS[1], n // (2 * k))
-        if k < 2 or heats[1] < 2 * heats[0]:
+        pays, most = self._entered(n)
+        if most < LEAST:
             return [], [], 0
-        self.others = [other for other in self.others if other[0] not in pays]
-        for build in pays:
+        self.others = [other for other in self.others if other not in pays]
+        for build, _ in pays:
             self.structures.append(build())
             self.batch.append(0.0)
             self.ray.append(0.0)
-        self._due = max(GROWTH * self.seconds, START)
+        k = len(self.structures)
         parts, answers, done, took, field = [], [], 0, [[] for _ in range(k)], range(k)
-        for rays in heats:
+        for rays in (most // FIRST_HEAT, most):
             turn = np.arange(rays * len(field)) // BLOCK % len(field)
             for i, number in enumerate(field):
                 which, structure = done + np.flatnonzero(turn == i), self.asked(number, light)
-                if not took[number]:
-                    ask(structure, which[:: rays // FIRST])
+                if number >= k - len(pays) and not took[number]:
+                    ask(structure, which[:: max(rays // WARM, 1)])
                 start = time.thread_time()
                 answers.append(ask(structure, which))
                 took[number].append((time.thread_time() - start, len(which)))
@@ -144,6 +162,7 @@ class Contest:
             done += len(turn)
             close = CLOSE * min(took[number][-1][0] for number in field)
             field = [number for number in field if took[number][-1][0] <= close]
+        self._due = GROWTH * self.seconds
         for number, own in enumerate(took):
             (few, rays), (many, more) = own[0], own[-1]
             ray = max(many - few, 0.0) / (more - rays) if len(own) > 1 else few / rays

@@ -6,9 +6,14 @@ Tests of the core import `rayscope.core`. Tests of the add-on import `bl_ext.use
 import importlib.util
 import os
 import sys
+import tempfile
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
+
+# What the core keeps for the user (the calibration) is kept here for as long as the tests run, by those that they start too.
+cache = tempfile.TemporaryDirectory(prefix="rayscope-cache-")
+os.environ["XDG_CACHE_HOME"] = cache.name
 
 if os.environ.get("RAYSCOPE_WITHOUT_BPY"):  # the core must work where there is no Blender: an import of these fails
     sys.modules.update(dict.fromkeys(["bpy", "bpy_extras", "mathutils", "gpu", "bl_ext"]))

@@ -4,8 +4,8 @@ from dataclasses import replace
 from pathlib import Path
 
 from ..arguments import picture_size, seed, whole
-from ..errors import MissingPackageError
-from ..lab import against_brute, antialiasing, bench, directional, division, needs, report
+from ..errors import MissingPackageError, ParameterError
+from ..lab import against_brute, antialiasing, automatic, bench, directional, division, report
 from ..outcome import DONE, FAILED, Outcome, say
 
 
@@ -13,7 +13,7 @@ def options(sub):
     sub.add_argument("--subdivisions", type=whole(0, 6), default=4,
                      help="of the monkey; 4 gives 272k triangles with the ground")
     sub.add_argument("--size", metavar="WxH", type=picture_size,
-                     help="primary rays; without it 512x512, for --adaptive 128x96")
+                     help="primary rays; without it 512x512, for --adaptive 128x96, for --automatic 240x180")
     sub.add_argument("--repeats", type=whole(1, 100), default=5, help="of everything; for --adaptive: seeds")
     sub.add_argument("--seed", type=seed, default=0)
     sub.add_argument("--growth", action="store_true", help="also how times grow from 1k to 1M triangles")
@@ -26,6 +26,7 @@ def options(sub):
     sub.add_argument("--automatic", action="store_true",
                      help="instead: the automatic choice of techniques against each fixed one, on the "
                      "procedural databases and the examples")
+    sub.add_argument("--only", metavar="A,B", help="with --automatic: these scenes alone, by name; to go on with a table")
     sub.add_argument("--adaptive", action="store_true",
                      help="instead: error, rays and time of adaptive antialiasing against 16 uniform samples, "
                      "on the examples")
@@ -34,9 +35,9 @@ def options(sub):
 def run(call):
     if call.adaptive:
         return _adaptive(call)
-    call.size = call.size or (512, 512)
     if call.automatic:
         return _automatic(call)
+    call.size = call.size or (512, 512)
     if call.directional:
         return _directional(call)
     if call.division:
@@ -61,13 +62,16 @@ def _adaptive(call):
 
 
 def _automatic(call):
-    size = tuple(min(side, 320) for side in call.size)
-    rows, missed = needs.benchmark(_examples(call, size), size, repeats=min(call.repeats, 3), say=say)
+    size = call.size or (240, 180)
+    only = call.only and call.only.split(",")
+    rows, missed = automatic.benchmark(_examples(call, size, only=only), size, repeats=min(call.repeats, 3), only=only, say=say)
+    if not rows:
+        raise ParameterError(f"There is no scene {call.only!r} to measure. Databases: {', '.join(automatic.DATABASES)}; and the examples by their files' names.")
     text = report.table(rows, list(rows[0]))
     if missed:
-        best, bvh = needs.BARS
+        best, bvh = automatic.BARS
         text += f"\n\nOver {best:.0%} slower than the best, or over {bvh:.0%} slower than bvh: {', '.join(missed)}."
-    record = report.record("bench", None, None, {"automatic": True, "size": size}, rows=rows, missed=missed)
+    record = report.record("bench", None, None, {"automatic": True, "size": size, "only": only}, rows=rows, missed=missed)
     return Outcome(text, record, FAILED if missed else DONE)
 
 
@@ -91,9 +95,11 @@ def _division(call):
     return Outcome(division.text(result), record, DONE if result.get("met", True) else FAILED)
 
 
-def _examples(call, size, names="*.blend"):
+def _examples(call, size, names="*.blend", only=None):
     """The scenes of example_blends, one after the other; none, and a line that says so, where they cannot be read."""
     for path in sorted((Path(__file__).parents[2] / "example_blends").glob(names)):
+        if only and path.stem not in only:
+            continue
         try:
             yield replace(call.open_in_blender(path, size), name=path.stem)
         except MissingPackageError as error:

@@ -4,7 +4,7 @@ from dataclasses import asdict
 
 from ..arguments import DEFAULT_SIDE, picture_size, proportional, whole
 from ..catalogue import CORES
-from ..lab import needs, report
+from ..lab import automatic, needs, report
 from ..outcome import Outcome
 
 
@@ -26,6 +26,6 @@ def run(call):
     record = report.record("needs", scene, None, asked, plan=asdict(plan))
     text = needs.text(plan)
     if call.check:
-        record["check"] = needs.against_fixed(scene, size, call.core)
+        record["check"] = automatic.against_fixed(scene, size, call.core)
         text += "\n\nTraced:\n" + report.table([record["check"]], list(record["check"]))
     return Outcome(text, record)

@@ -7,9 +7,10 @@ import pytest
 from rayscope.core import Camera, Light, Material, Object, Scene, build, trace
 from rayscope.core.contest import Contest
 from rayscope.core.lab import needs
+from rayscope.core.lab.needs import ground
 from rayscope.core.lab.rays import ray_sets
 
-SCENE = needs._lit(needs._triangles(200))
+SCENE = ground.lit(ground.triangles(200))
 
 
 class Slow:
@@ -46,7 +47,7 @@ def built():
 def _contest(structures, expected):
     """A contest that tries as soon as it may."""
     contest = Contest(structures[0], [(lambda s=s: s, 0.0) for s in structures[1:]], expected)
-    contest._due = 0.0
+    contest._due, contest.seen, contest.seconds = 0.0, 1, 1e-6
     return contest
 
 
@@ -125,7 +126,7 @@ def test_lights_share_a_contest(built):
 
 def test_pictures_are_the_same(monkeypatch):
     """Whatever takes part, and however often it changes."""
-    scene = Scene([Object("mesh", needs._triangles(200).objects[0].geometry, materials=(Material("mirror", mirror=0.5),))],
+    scene = Scene([Object("mesh", ground.triangles(200).objects[0].geometry, materials=(Material("mirror", mirror=0.5),))],
                   [Light(f"lamp {k}", "point", (0.5, 0.5, 0.5), (2.0 - 4.0 * k, -3.0, 3.0)) for k in range(2)],
                   Camera.look_at((3.0, -3.0, 2.0), (0.0, 0.0, 0.0)))
     names = {"primary": ("grid", "image-directory", "bvh"), "secondary": ("bvh", "grid"), "shadow": ("bvh", "light-buffer")}
@@ -145,8 +146,9 @@ def test_pictures_are_the_same(monkeypatch):
 def test_what_may_be_quicker_takes_part():
     rows = [{"technique": name, "T_B": build, "s primary": seconds, "s": 0.0} for name, build, seconds in (
         ("bvh", 0.1, 2.0), ("grid", 0.05, 1.0), ("octree", 0.05, 2.2), ("kd-tree", 9.0, 1.5), ("brute", 0.001, 400.0), ("macro-grid", 0.06, 2.4))]
-    assert needs.contenders({"primary": "bvh"}, rows) == {"primary": [("bvh", 0.0), ("grid", 0.05), ("kd-tree", 9.0), ("octree", 0.05)]}
-    assert needs.contenders({"primary": "grid"}, rows)["primary"][:3] == [("grid", 0.05), ("kd-tree", 9.0), ("bvh", 0.0)]
+    # Not what is thought to be far slower, nor what takes too long to build.
+    assert needs.contenders({"primary": "bvh"}, rows) == {"primary": [("bvh", 0.0), ("grid", 0.05), ("octree", 0.05)]}
+    assert needs.contenders({"primary": "grid"}, rows)["primary"] == [("grid", 0.05), ("bvh", 0.0), ("octree", 0.05)]
     assert needs.contenders({"primary": "grid"}, [rows[1], rows[4]]) == {"primary": [("grid", 0.05)]}
     quick = [row | {"s primary": 0.01 * row["s primary"]} for row in rows]
     assert needs.contenders({"primary": "bvh"}, quick) == {"primary": [("bvh", 0.0)]}                    # too quick for a trial

@@ -8,7 +8,7 @@ import pytest
 
 from rayscope.core import Camera, Light, Material, MemoryEstimateError, Scene, build, techniques, trace
 from rayscope.core.lab import estimate as lab
-from rayscope.core.lab import needs
+from rayscope.core.lab.needs import ground
 from rayscope.core.lab.estimate import estimate
 
 
@@ -63,8 +63,8 @@ def test_adaptive_options_count():
 @pytest.mark.parametrize("name", ["beams", "cones", "pyramids"])
 def test_what_traces_other_things_than_rays_is_of_the_right_order(name, core):
     """Their times differ more from scene to scene."""
-    scene = needs._lit(needs._triangles(500 if core == "fast" else 100))
-    trace(needs._lit(needs._triangles(5)), name, core, size=(4, 4))     # imports
+    scene = ground.lit(ground.triangles(500 if core == "fast" else 100))
+    trace(ground.lit(ground.triangles(5)), name, core, size=(4, 4))     # imports
     start = time.process_time()
     trace(scene, name, core, size=(32, 24))
     assert 0.03 < estimate(scene, name, core, (32, 24)).seconds / (time.process_time() - start) < 30
