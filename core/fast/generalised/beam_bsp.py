@@ -28,8 +28,8 @@ class Bsp:
         Unit normal n and distance: n . x + plane[3] is the height above it.
     below, above : ndarray, shape (nodes,)
         Children, -1 for none; they come after their parent.
-    first : ndarray, shape (nodes,)
-        First of the faces in the plane, -1 for none; `more` tells whether the next face is there too.
+    first, number : ndarray, shape (nodes,)
+        The faces in the plane: those from `first` on.
     lo, hi : ndarray, shape (nodes, 3)
         Boxes around all faces in and below a node.
     points, count, surface
@@ -86,10 +86,8 @@ class Bsp:
         for name in ("points", "count", "surface", "face"):
             setattr(self, name, getattr(self, name)[order])
         owner = owner[order]
-        self.first = np.full(nodes, -1, np.int64)
-        there, place = np.unique(owner, return_index=True)
-        self.first[there] = place
-        self.more = np.append(owner[1:] == owner[:-1], False)[: len(owner)]
+        self.number = np.bincount(owner, minlength=nodes)
+        self.first = np.cumsum(self.number) - self.number
         self.lo, self.hi = np.full((nodes, 3), np.inf), np.full((nodes, 3), -np.inf)
         self.face_lo, self.face_hi = self.points.min(axis=1, initial=np.inf), self.points.max(axis=1, initial=-np.inf)
         np.minimum.at(self.lo, owner, self.face_lo)

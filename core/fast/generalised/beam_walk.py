@@ -10,7 +10,7 @@ what is left of its walk.
 import numpy as np
 
 from .beam_bsp import heights
-from .beam_clip import boxes, joined, widened
+from .beam_clip import expanded, joined, widened
 from .clipping import cut, sides
 
 #: Lines nearer than this to a corner, in pixels, pass through it.
@@ -19,6 +19,8 @@ TOLERANCE = 1e-10
 EDGE_ON = 1e-12
 #: What is seen where there is no face.
 SKY = -1
+#: Pieces are taken to be as wide as they are along these; many are slivers.
+DIRECTIONS = (1, 0), (0, 1), (1, 1), (1, -1)
 
 
 class Fragments:
@@ -112,11 +114,12 @@ class Walk:
                 self._done(np.ones(len(self.beam), bool), self.unknown)
                 break
             task = self.task[self.top]
-            self.top = self.next[self.top]
             node, face = np.flatnonzero(task < len(self.bsp)), np.flatnonzero(task >= len(self.bsp))
-            if len(node):
-                self._enter(node, task[node])
-            if len(face):
+            self.top[node] = self.next[self.top[node]]
+            self._enter(node, task[node])
+            # Faces cost many times what nodes do: they wait until they are the greater part.
+            if len(face) >= len(node):
+                self.top[face] = self.next[self.top[face]]
                 self._meet(face, task[face] - len(self.bsp))
         return Fragments.joined(self.out) if self.out else Fragments.none()
 
@@ -140,20 +143,25 @@ class Walk:
             setattr(self, name, getattr(self, name)[which])
 
     def _push(self, which, task):
-        """Put tasks in front of what pieces still have to do."""
+        """Put tasks in front of what pieces still have to do; of several for one piece, which follow each other, in order."""
         end = self.end + len(which)
         if end > len(self.task):
             room = np.zeros(max(end, len(self.task)), np.int64)
             self.task, self.next = np.concatenate([self.task, room]), np.concatenate([self.next, room])
+        new, again = np.arange(self.end, end), which[1:] == which[:-1]
         self.task[self.end:end], self.next[self.end:end] = task, self.top[which]
-        self.top[which] = np.arange(self.end, end)
+        self.next[new[:-1][again]] = new[1:][again]
+        first = np.append(True, ~again)[: len(which)]
+        self.top[which[first]] = new[first]
         self.end = end
 
     def _sight(self, beam, points):
-        """Half-spaces around pieces: four through the beam's origin, and where it starts; shape (n, 5, 4)."""
-        lo, hi = boxes(points)
+        """Half-spaces around pieces: eight through the beam's origin, and where it starts; shape (n, 9, 4)."""
         x, y, _, w = self.beams.map[beam].transpose(1, 0, 2)
-        planes = x - lo[:, :1] * w, hi[:, :1] * w - x, y - lo[:, 1:] * w, hi[:, 1:] * w - y, self.beams.start[beam]
+        planes = [self.beams.start[beam]]
+        for a, b in DIRECTIONS:
+            along, form = a * points[..., 0] + b * points[..., 1], a * x + b * y
+            planes += [form - along.min(axis=1)[:, None] * w, along.max(axis=1)[:, None] * w - form]
         return np.stack(planes, axis=1)
 
     def _inside(self, piece, lo, hi):
@@ -173,8 +181,9 @@ class Walk:
         self.steps += np.bincount(beam, minlength=len(self.beams))
         front = (bsp.plane[node] * self.beams.back[beam, :, 2]).sum(axis=1) >= 0.0
         self._push_node(piece, np.where(front, bsp.below[node], bsp.above[node]))
-        some = np.flatnonzero(bsp.first[node] >= 0)
-        self._push(piece[some], len(bsp) + bsp.first[node[some]])
+        own, face = expanded(bsp.first[node], bsp.number[node])
+        some = np.flatnonzero(self._inside(piece[own], bsp.face_lo[face], bsp.face_hi[face]))
+        self._push(piece[own[some]], len(bsp) + face[some])
         self._push_node(piece, np.where(front, bsp.above[node], bsp.below[node]))
 
     def _push_node(self, piece, node):
@@ -186,8 +195,6 @@ class Walk:
     def _meet(self, piece, face):
         """Faces: pieces are cut by their outlines."""
         bsp = self.bsp
-        more = np.flatnonzero(bsp.more[face])
-        self._push(piece[more], len(bsp) + face[more] + 1)
         near = np.flatnonzero(self._inside(piece, bsp.face_lo[face], bsp.face_hi[face]))
         if not len(near):
             return

@@ -10,7 +10,6 @@ import math
 from dataclasses import dataclass
 
 from .beam_bsp import Node, sides_of
-from .beam_clip import box
 from .clipping import cut, sides
 from .beam_space import height
 
@@ -20,6 +19,8 @@ TOLERANCE = 1e-10
 EDGE_ON = 1e-12
 #: What is seen where there is no face.
 SKY = -1
+#: Pieces are taken to be as wide as they are along these; many are slivers.
+DIRECTIONS = (1, 0), (0, 1), (1, 1), (1, -1)
 
 
 @dataclass(slots=True)
@@ -71,7 +72,7 @@ class Walk:
         out, outlines = [], {}
         todo = []
         for beam, source, points in pieces:
-            waits = (self.bsp.root, None) if self.bsp.root and inside(beam, box(points), self.bsp.root) else None
+            waits = (self.bsp.root, None) if self.bsp.root and inside(sight(beam, points), self.bsp.root) else None
             todo.append((beam, source, points, waits))
         while todo:
             self.check()
@@ -84,10 +85,11 @@ class Walk:
                 break
             else:
                 task, rest = waits
+                around = sight(beam, points)
                 if isinstance(task, Node):
-                    todo.append((beam, source, points, self._entered(beam, points, task, rest)))
+                    todo.append((beam, source, points, self._entered(beam, around, task, rest)))
                     continue
-                if not inside(beam, box(points), task):
+                if not inside(around, task):
                     todo.append((beam, source, points, rest))
                     continue
                 key = id(beam), id(task)
@@ -102,17 +104,16 @@ class Walk:
             f.level = f.source.level + 1 if f.source else 0
         return out
 
-    def _entered(self, beam, points, node, rest):
+    def _entered(self, beam, around, node, rest):
         """What a piece has to do in a node: before the plane, in it, and beyond it."""
         beam.steps += 1
         front = sum(p * e for p, e in zip(node.plane, beam.eye)) >= 0.0
         near, far = (node.above, node.below) if front else (node.below, node.above)
-        around = box(points)
-        if far and inside(beam, around, far):
+        if far and inside(around, far):
             rest = (far, rest)
         for face in reversed(node.faces):
             rest = (face, rest)
-        if near and inside(beam, around, near):
+        if near and inside(around, near):
             rest = (near, rest)
         return rest
 
@@ -125,17 +126,19 @@ class Walk:
         return (seen, parts) if seen else ([], [points])
 
 
-def inside(beam, around, thing):
-    """Whether the box of a node or face reaches into the half-spaces around a piece, given by its rectangle."""
-    (x0, y0), (x1, y1) = around
+def sight(beam, points):
+    """Half-spaces around a piece: eight through the beam's origin, and where it starts."""
     x, y, _, w = beam.map
-    planes = [
-        [a - x0 * b for a, b in zip(x, w)],
-        [x1 * b - a for a, b in zip(x, w)],
-        [a - y0 * b for a, b in zip(y, w)],
-        [y1 * b - a for a, b in zip(y, w)],
-        beam.start,
-    ]
+    planes = [beam.start]
+    for a, b in DIRECTIONS:
+        along, form = [a * p + b * q for p, q in points], [a * p + b * q for p, q in zip(x, y)]
+        low, high = min(along), max(along)
+        planes += [[f - low * v for f, v in zip(form, w)], [high * v - f for f, v in zip(form, w)]]
+    return planes
+
+
+def inside(planes, thing):
+    """Whether the box of a node or face reaches into half-spaces."""
     centre = [0.5 * (l + h) for l, h in zip(thing.lo, thing.hi)]
     half = [0.5 * (h - l) for l, h in zip(thing.lo, thing.hi)]
     for plane in planes:
