@@ -9,8 +9,8 @@ import numpy as np
 
 from ...catalogue import technique, techniques
 from ...options import STANDARD
-from ..estimate import estimate
-from .calibrated import ROUGH, calibration, rough
+from ..estimate import duration, estimate
+from .calibrated import CALIBRATED, ROUGH, calibration, rough
 
 #: Bytes of a triangle in a structure, about: what copies of instances would take.
 TRIANGLE_BYTES = 250
@@ -123,15 +123,17 @@ def _others(scene, seen, tests, rays, rows, core, size, samples, depth):
             continue
         if row.name in models:
             why = f"its time does not follow from its counters: where it was fitted, the model was off by a factor of {model.off:.2g}"
+        elif row.name in CALIBRATED[core]:
+            why = "calibrating, which takes no more than a second, did not come to it yet"
         else:
-            why = "it has not been the quickest for any scene yet, so it is fitted roughly and no candidate"
+            why = "it was the quickest for no scene that was measured, so it is no candidate and is fitted roughly"
         seconds = sum(model.per_ray(kind, seen.measures, tests)[2] * rays[kind] for kind in served)
         yield (row.name, why, f"{built}, {_about(seconds)} for {' and '.join(served)} rays, right to a factor of {max(model.off, ROUGH):.2g}")
 
 
 def _about(seconds):
     """A time in words."""
-    return f"about {seconds:.2g} s" if seconds >= 1e-3 else f"about {1e3 * seconds:.2g} ms"
+    return f"about {duration(seconds)}" if seconds >= 0.1 else f"about {1e3 * seconds:.2g} ms"
 
 
 def _bytes(number):
@@ -146,7 +148,7 @@ def _import(core, family, *modules):
     start = time.perf_counter()
     for file in files:
         SourceFileLoader(file.stem, str(file)).get_code(file.stem)
-    return f"{1e3 * (time.perf_counter() - start):.2g} ms at least to import {len(files)} module(s), {sum(f.stat().st_size for f in files) / 1e3:.0f} kB"
+    return f"{_about(time.perf_counter() - start)} at least to import {len(files)} module(s), {sum(f.stat().st_size for f in files) / 1e3:.0f} kB"
 
 
 def _change_seconds(core):

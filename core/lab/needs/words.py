@@ -1,7 +1,9 @@
 """A plan in words."""
 
 from ...catalogue import technique
+from ...options import STANDARD
 from .. import report
+from ..estimate import duration
 
 
 def precision(seen):
@@ -18,14 +20,15 @@ def text(result):
     """A plan in words."""
     seen = result.seen
     kinds = ", ".join(f"{number:,} x {kind}" for kind, number in seen.kinds.items())
+    share = f", {seen.seconds / seen.build:.1%} of building the {STANDARD}" if seen.build else ""
     lines = [f"The scene: {kinds}; a line through it meets {seen.measures.pierced:.3g} of their boxes, and ends among "
-             f"{seen.measures.crowd:.3g} in one cell of a grid; looked at in {1e3 * seen.seconds:.2g} ms.", "", "It takes:"]
+             f"{seen.measures.crowd:.3g} in one cell of a grid. Looked at in {1e3 * seen.seconds:.2g} ms{share}.", "", "It takes:"]
     for kind, name in result.choice.items():
         row = next(r for r in result.rows if r["technique"] == name)
-        lines.append(f"  {kind} rays: {name} ({technique(name).label}); about {result.rays[kind]:,} rays, {row[f's {kind}']:.2g} s, N_IT {row[f'N_IT {kind}']:.3g}, "
+        lines.append(f"  {kind} rays: {name} ({technique(name).label}); about {result.rays[kind]:,} rays, {duration(row[f's {kind}'])}, N_IT {row[f'N_IT {kind}']:.3g}, "
                      f"N_TS {row[f'N_TS {kind}']:.3g} per ray")
     if any(result.tried.values()):
-        lines.append("  on trial while the picture is traced, if rays take ten times as long as the build: "
+        lines.append("  on trial while the picture is traced, if there are rays enough to repay it: "
                      + "; ".join(f"{kind} rays: {', '.join(names)}" for kind, names in result.tried.items() if names))
     lines += [f"  {len(set(result.choice.values()))} structure(s), {2 if 'instance' in seen.kinds else 1} level(s); {result.precision}.", "", "Left out:"]
     lines += [f"  {item['what']}: {item['why']}. It would have cost: {item['cost']}." for item in result.left_out]
