@@ -6,7 +6,7 @@ import time
 import numpy as np
 
 from ...errors import MemoryEstimateError
-from .spawned import spawned_inside
+from .spawned import met_again, spawned
 from .trial import EPSILON, T_BOUND, asked, built, lengths, size_of
 
 #: A case may take this many times the friendly case's time, unless its counters are as many times higher.
@@ -18,10 +18,14 @@ TIMED = {"pure": 24, "fast": 400}
 
 
 def differences(got, right, batch, size):
-    """Masks of rays: a wrong hit, none where there is one, one where there is none; and the largest error of t.
+    """What two structures' hits differ in. A different primitive at the same t is no difference: they are tied.
 
-    The error is in units of EPSILON * max(|t|, size of the scene). A different primitive at the same t is no error:
-    they are tied.
+    Returns
+    -------
+    wrong, lost, ghost : ndarray of bool
+        Rays with another hit, none where there is one, one where there is none.
+    errors : dict
+        The largest of t: t_error in units of EPSILON * max(|t|, size of the scene), t_ulp in those of its last place, t_relative.
     """
     hit, expected = got.primitive >= 0, right.primitive >= 0
     both = hit & expected
@@ -29,11 +33,12 @@ def differences(got, right, batch, size):
     t, t0 = np.where(both, got.t, 0.0) * length, np.where(both, right.t, 0.0) * length
     with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
         apart = np.abs(t - t0)
-        error = np.where(apart > 0.0, apart / (EPSILON * np.maximum(np.abs(t0), size)), 0.0)
-    return both & (error > T_BOUND / EPSILON), ~hit & expected, hit & ~expected, float(error.max(initial=0.0))
+        error, ulp, relative = (np.where(apart > 0.0, apart / unit, 0.0) for unit in (EPSILON * np.maximum(np.abs(t0), size), np.spacing(np.abs(t0)), np.abs(t0)))
+    errors = {name: float(x.max(initial=0.0)) for name, x in (("t_error", error), ("t_ulp", ulp), ("t_relative", relative))}
+    return both & (error > T_BOUND / EPSILON), ~hit & expected, hit & ~expected, errors
 
 
-def examine(case, scene, batch, right, name, core, seed, base, timed=True):
+def examine(case, scene, batch, right, name, core, seed, base=None, timed=True, parameters=None):
     """One technique on one case.
 
     Parameters
@@ -42,23 +47,25 @@ def examine(case, scene, batch, right, name, core, seed, base, timed=True):
         Brute force's.
     base : dict or None
         The same technique's `seconds` and `steps` on the friendly case.
+    parameters : dict, optional
+        Of the technique, besides those that the case wants.
 
     Returns
     -------
     dict
-        A row of the table; `bad`: numbers of the rays that failed, `seconds`, `steps`.
+        A row of the table; `bad`: numbers of the rays that failed, `bad_spawned`: some of the spawned ones, `seconds`, `steps`.
     """
     row = {"case": case.name, "technique": name, "core": core, "rays": len(batch), "wrong": 0, "lost": 0, "ghost": 0, "leaks": 0, "self_hits": 0,
-           "t_error": 0.0, "bad": []}
+           "t_error": 0.0, "parameters": parameters or {}, "bad": []}
     try:
         start = time.perf_counter()
-        index = built(case, scene, name, core)
+        index = built(case, scene, name, core, **(parameters or {}))
         row["T_B"] = time.perf_counter() - start
         got = asked(batch, index, count=True)
     except MemoryEstimateError as error:
         return row | {"verdict": f"refused: {error}"}
-    wrong, lost, ghost, row["t_error"] = differences(got, right, batch, size_of(scene))
-    row.update(wrong=int(wrong.sum()), lost=int(lost.sum()), ghost=int(ghost.sum()))
+    wrong, lost, ghost, errors = differences(got, right, batch, size_of(scene))
+    row.update(errors, wrong=int(wrong.sum()), lost=int(lost.sum()), ghost=int(ghost.sum()))
     bad = wrong | lost | ghost
     if batch.must:
         leaks = (got.primitive < 0) == (batch.must == "hit")
@@ -68,11 +75,15 @@ def examine(case, scene, batch, right, name, core, seed, base, timed=True):
         blocked = np.asarray(index.occluded(batch.o, batch.d, t_min=batch.t_min, t_max=batch.t_max))
     row["wrong"] += int((blocked != (right.primitive >= 0)).sum())
     bad |= blocked != (right.primitive >= 0)
-    if case.closed:
-        rays, start = spawned_inside(index, case, scene, got, batch, seed, core)
+    if case.inside:
+        rays = spawned(index, case, scene, len(batch), seed, core)
         again = asked(rays, index)
-        row["self_hits"] = int((again.primitive == start).sum())
-        row["leaks"] += int((again.primitive < 0).sum())
+        row["spawned"] = len(rays)
+        met, through = met_again(again, rays, scene), again.primitive < 0
+        row["self_hits"] = int(met.sum())
+        row["leaks"] += int(through.sum())
+        row["bad_spawned"] = [{"o": rays.o[k].tolist(), "d": rays.d[k].tolist(), "leaving": rays.leaving[:, k].tolist()}
+                              for k in np.flatnonzero(met | through)[:5]]
     row["bad"] = np.flatnonzero(bad).tolist()
     if timed and len(batch):
         row |= _timed(index, batch, core, base)

@@ -8,6 +8,7 @@ import numpy as np
 from ...catalogue import ALL_RAYS, technique
 from ...errors import RayscopeError
 from ...rendering import Rendering
+from .pictures import pictures
 
 COLUMNS = ("case", "technique", "core", "pixels", "wrong", "not_finite", "brightest", "seconds", "slow", "work", "verdict")
 #: Part of the picture's largest value by which a pixel may differ. Near the critical angle rounding counts as its root does.
@@ -29,7 +30,7 @@ def traced(case, seed, name, core):
     dict
         seconds : of this thread. work : rays, tests and steps.
     """
-    scene = case.make(np.random.default_rng([seed, zlib.crc32(case.name.encode())]))
+    scene = case.make(np.random.default_rng([seed, zlib.crc32((case.like or case.name).encode())]))
     row = technique(name)
     base = name if row.rays == ALL_RAYS else "brute"
     others = {} if base == name else dict.fromkeys(row.rays, name)
@@ -83,12 +84,12 @@ def examined(case, seed, contestants, base, known):
     Ray by ray, every technique's picture is brute force's of the pure core. Cones, pyramids and beams see a pixel's area:
     their pictures are held against their own of the core that comes first, and have no more energy than others.
     """
-    rows = []
+    rows, model = [], next(p for p in pictures() if p.name == case.like) if case.like else case
     for name, core in contestants:
-        key = case.name, "brute" if technique(name).ray_by_ray else name
+        key = model.name, "brute" if technique(name).ray_by_ray else name
         try:
             if key not in known:
-                known[key] = traced(case, seed, key[1], "pure" if key[1] == "brute" else core)[0]
+                known[key] = traced(model, seed, key[1], "pure" if key[1] == "brute" else core)[0]
             row = examine(case, seed, name, core, known[key], base.get((name, core)))
         except RayscopeError:
             raise

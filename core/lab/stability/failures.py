@@ -1,6 +1,7 @@
 """A failing case in a file, and that file run again."""
 
 import json
+import math
 import zlib
 from pathlib import Path
 
@@ -15,8 +16,9 @@ from .examine import examine
 from .examine_pictures import examined
 from .pictures import pictures
 from .rays import Batch, corners_of
-from .trial import RAYS, asked, built, scene_and_rays
-from .truth import truth_row
+from .scenes import REFUSED
+from .trial import RAYS, asked, built, given, scene_and_rays, variant_text
+from .truth import refusal, truth_row
 
 
 def failure(row, seed, full):
@@ -26,14 +28,16 @@ def failure(row, seed, full):
     -------
     dict
     """
-    if row["case"] in {c.name for c in pictures()}:
+    if row["case"] in REFUSED or row["case"] in {c.name for c in pictures(full)}:
         return {k: row[k] for k in ("case", "technique", "core", "verdict", "bad")} | {"full": full, "seed": seed}
     case = next(c for c in cases(full) if c.name == row["case"])
-    scene, batch = scene_and_rays(case, seed, RAYS[full])
+    scene, batch = scene_and_rays(case, seed, case.n or RAYS[full])
     rays = [{"number": r, "o": [x.hex() for x in batch.o[r].tolist()], "d": [x.hex() for x in batch.d[r].tolist()],
              "t_min": batch.t_min[r].item().hex(), "t_max": batch.t_max[r].item().hex()} for r in row["bad"][:20]]
-    return {"case": case.name, "full": full, "seed": seed, "technique": row["technique"], "core": row["core"], "verdict": row["verdict"],
-            "scene": checksum(scene), "rays": rays}
+    rays += [{"number": f"spawned {k}", "o": [x.hex() for x in ray["o"]], "d": [x.hex() for x in ray["d"]], "t_min": 0.0.hex(), "t_max": math.inf.hex(),
+              "leaving": ray["leaving"]} for k, ray in enumerate(row.get("bad_spawned", ()))]
+    return {"case": case.name, "full": full, "seed": seed, "technique": row["technique"], "core": row["core"], "parameters": row.get("parameters", {}),
+            "verdict": row["verdict"], "scene": checksum(scene), "rays": rays}
 
 
 def checksum(scene):
@@ -64,32 +68,34 @@ def replay(path, say=lambda line: None):
     """
     try:
         saved = json.loads(Path(path).read_text(encoding="utf-8"))
-        if saved["case"] in {c.name for c in pictures()}:
+        if saved["case"] in REFUSED:
+            row = refusal(saved["case"], saved["seed"])
+            return {"rays": [], "row": row, "truth": {"verdict": "ok"}, "failed": row["verdict"] != "ok"}
+        if saved["case"] in {c.name for c in pictures(saved["full"])}:
             return _replayed_picture(saved)
         case = next(c for c in cases(saved["full"]) if c.name == saved["case"])
         rays = [[[float.fromhex(x) for x in ray[k]] for k in "od"] + [float.fromhex(ray[k]) for k in ("t_min", "t_max")] for ray in saved["rays"]]
     except (ValueError, KeyError, TypeError, StopIteration):
         raise SceneError(f"{path}: this is no failing case that `rayscope stability` has written; give one of the files in its folder failures.") from None
-    scene, batch = scene_and_rays(case, saved["seed"], RAYS[saved["full"]])
+    seed, full, name, core, parameters = (saved[k] for k in ("seed", "full", "technique", "core", "parameters"))
+    scene, batch, right = given(case, seed, full)
     if checksum(scene) != saved["scene"]:
         raise SceneError(f"{path}: the case {case.name!r} has changed since this was written; run `rayscope stability` again.")
-    say(f"{saved['technique']} ({saved['core']}) on {case.name}: was {saved['verdict']}")
-    brute, index = built(case, scene, "brute", "pure"), built(case, scene, saved["technique"], saved["core"])
+    say(f"{variant_text(name, parameters)} ({core}) on {case.name}: was {saved['verdict']}")
+    brute, index = built(case, scene, "brute", case.cores[0]), built(case, scene, name, core, **parameters)
     lines, lists = [], corners_of(scene).tolist()
-    if rays:
-        some = Batch(*(np.array([r[k] for r in rays]) for k in range(4)), must=batch.must)
-        right, got = asked(some, brute), asked(some, index)
-        for k, ray in enumerate(saved["rays"]):
-            true = exact.nearest(*rays[k][:2], lists, *rays[k][2:]) if case.exact and lists and np.isfinite(some.o[k]).all() else None
-            lines.append({"number": ray["number"], "brute": (float(right.t[k]), int(right.primitive[k])),
-                          "found": (float(got.t[k]), int(got.primitive[k])), "exact": float(true[0]) if true else None})
-    right = asked(batch, brute)
-    friendly = next(c for c in cases(saved["full"]) if c.name == "friendly")
-    scene_f, batch_f = scene_and_rays(friendly, saved["seed"], RAYS[saved["full"]])
-    base = examine(friendly, scene_f, batch_f, asked(batch_f, built(friendly, scene_f, "brute", "pure")), saved["technique"], saved["core"],
-                   saved["seed"], None)
-    row = examine(case, scene, batch, right, saved["technique"], saved["core"], saved["seed"], base)
-    true = truth_row(case, scene, batch, right, saved["full"])
+    for ray, numbers in zip(saved["rays"], rays):
+        leaving = np.array(ray["leaving"])[:, None] if "leaving" in ray else None
+        one = Batch(*(np.array([x]) for x in numbers), must=batch.must, leaving=leaving)
+        expected, got = asked(one, brute), asked(one, index)
+        true = exact.nearest(*numbers[:2], lists, *numbers[2:]) if case.exact and lists and leaving is None and np.isfinite(one.o).all() else None
+        lines.append({"number": ray["number"], "brute": (float(expected.t[0]), int(expected.primitive[0])),
+                      "found": (float(got.t[0]), int(got.primitive[0])), "exact": float(true[0]) if true else None})
+    friendly = next(c for c in cases(full) if c.name == "friendly")
+    scene_f, batch_f, right_f = given(friendly, seed, full)
+    base = examine(friendly, scene_f, batch_f, right_f, name, core, seed)
+    row = examine(case, scene, batch, right, name, core, seed, base, not parameters, parameters)
+    true = truth_row(case, scene, batch, right, full)
     return {"rays": lines, "row": row, "truth": true, "failed": row["verdict"] != "ok" or true["verdict"] != "ok"}
 
 

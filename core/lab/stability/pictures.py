@@ -9,7 +9,8 @@ from ...scene.camera import Camera
 from ...scene.light import Light
 from ...scene.material import Material, World
 from ...scene.scene import Mesh, Object, Scene, Shapes
-from .scenes import ball, blocks, lit, nested_boxes, random_soup, tangent_spheres
+from .rays import frame
+from .scenes import ball, blocks, degenerate, fan, identical, lit, nested_boxes, random_soup, stadium, tangent_spheres
 
 #: What glass and mirrors send on is all that comes in: in front of surroundings of 1 nothing is brighter than 1.
 WHITE = World((1.0, 1.0, 1.0), ambient=(0.0, 0.0, 0.0))
@@ -32,6 +33,8 @@ class Picture:
         Of the square picture, pixels: odd, so that one looks straight along the axis.
     furnace : bool
         The surroundings are 1 all over and nothing else shines: no pixel may be brighter.
+    like : str
+        The picture that it has to be equal to, made with the same random numbers; empty: itself.
     """
 
     name: str
@@ -39,6 +42,7 @@ class Picture:
     depth: int = 4
     side: int = 5
     furnace: bool = False
+    like: str = ""
 
 
 def glass(ior):
@@ -60,6 +64,34 @@ def to_corners(side):
 def friendly(rng):
     scene = random_soup(rng)
     return Scene(scene.objects, [Light("light", "point", (30.0, 30.0, 30.0), (2.0, -3.0, 4.0))], camera((0.5, -3.0, 0.5), (0.5, 0.5, 0.5), 0.4))
+
+
+def measured(scale=1.0, offset=0.0):
+    """Mirroring and plain triangles under a point light and an area light, in some units and at some place.
+
+    Scaled by a power of two no number but the exponents changes: the picture has to be the same.
+    """
+    def make(rng):
+        mesh = random_soup(rng).objects[0].geometry
+        parts = (mesh.triangles[::2], Material("half", ambient=0.2, diffuse=0.5, mirror=0.5)), (mesh.triangles[1::2], PLAIN)
+        things = [Object(material.name, Mesh(mesh.vertices * scale + offset, triangles), materials=(material,)) for triangles, material in parts]
+        at = lambda *p: tuple(scale * np.array(p) + offset)
+        lights = [Light("point", "point", (60.0 * scale**2,) * 3, at(2.0, -3.0, 4.0)),
+                  Light("area", "area", (2.0, 2.0, 2.0), at(-1.0, -1.0, 3.0), (0.0, 0.0, -1.0), axes=((0.5 * scale, 0.0, 0.0), (0.0, 0.5 * scale, 0.0)))]
+        return Scene(things, lights, camera(at(0.5, -3.0, 0.5), at(0.5, 0.5, 0.5), 0.2))
+    return make
+
+
+def seen(make, centre=None, size=None):
+    """Any scene, from beside it, lit by a lamp next to the camera; without its own materials. centre, size: of what is seen; its box if absent."""
+    given = np.asarray(centre, float), size
+
+    def made(rng):
+        scene = _plain(make(rng))
+        centre, size = given if given[1] else frame(scene)
+        at = tuple(centre + size * np.array((0.3, -2.5, 0.4)))
+        return Scene(scene.objects, [Light("light", "point", (90.0 * size**2,) * 3, tuple(np.add(at, (0.2 * size, 0.0, 0.0))))], camera(at, tuple(centre), 0.4))
+    return made
 
 
 def cube_of_directions(rng):
@@ -126,6 +158,14 @@ def pictures(full=False):
     """
     return [
         Picture("friendly picture", friendly),
+        Picture("picture of scale 1", measured()),
+        *(Picture(f"picture of scale 2^{k}", measured(2.0**k), like="picture of scale 1") for k in (-27, 27)),
+        *(Picture(f"picture at distance 1e{k}", measured(1.0, 10.0**k)) for k in ((2, 4, 6, 8) if full else (6,))),
+        Picture("picture of nothing", seen(lambda rng: Scene()), 1),
+        Picture("picture of bad triangles", seen(degenerate, (0.5, 0.5, 0.5), 1.0)),
+        Picture("picture of a fan of slivers", seen(fan, (1.0, 0.0, 0.0), 1.0)),
+        Picture("picture of many identical", seen(identical(100))),
+        Picture("picture of a tiny thing in a huge one", seen(stadium, (3.0, 2.0, 1e-3), 3e-4)),
         Picture("corners of a direction cube", cube_of_directions, 2),
         Picture("lights on planes and vertices", lambda rng: _plain(lit(rng))),
         Picture("lights inside solids", inside_a_solid),

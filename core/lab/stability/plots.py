@@ -4,10 +4,12 @@ import numpy as np
 
 from ...catalogue import technique
 from .. import report
-from .sweeps import drift, mirror_times
+from .sweeps import between_mirrors, drift
 
 #: What the plots show over what; see `plots`.
 SWEEPS = {"scale": "scale of the scene", "distance": "distance from the origin, in sizes of the scene", "aspect": "length of slivers over their width"}
+#: Techniques that are traced between two mirrors.
+MIRRORED = ("bvh", "grid", "octree", "kd-tree", "bsp-tree")
 
 
 def curves(path, lines, x, y, title):
@@ -44,20 +46,28 @@ def plots(result, folder, say=lambda line: None):
         for row in result["single"]:
             if row["sweep"][0] == sweep and row["lost"] < row["rays"]:
                 error.setdefault(f"{technique(row['technique']).label}, float32", []).append((row["sweep"][1], row["t_error"]))
-        slow = {}
+        lost, slow = {"ours, float64": [(r["sweep"][1], r["lost"] / r["rays"]) for r in result["truth"] if r.get("sweep") and r["sweep"][0] == sweep]}, {}
+        for row in result["single"]:
+            if row["sweep"][0] == sweep:
+                lost.setdefault(f"{technique(row['technique']).label}, float32", []).append((row["sweep"][1], row["lost"] / row["rays"]))
         for row in result["rows"]:
             if points.get(row["case"], ("",))[0] == sweep and row.get("slow"):
                 slow.setdefault(f"{row['technique']} ({row['core']})", []).append((points[row["case"]][1], row["slow"]))
-        for name, lines, y in (("error", error, "largest error of t, in 2^-52 max(|t|, size)"), ("time", slow, "time over that of the friendly case")):
-            if curves(folder / f"{name}_{sweep}.png", lines, label, y, f"{name} over {label}"):
-                files.append(folder / f"{name}_{sweep}.png")
+        for name, lines, y in (("error", error, "largest error of t, in 2^-52 max(|t|, size)"), ("lost hits", lost, "share of rays that lose their hit; none is drawn at 0.001"),
+                               ("time", slow, "time over that of the friendly case")):
+            path = folder / f"{name.replace(' ', '_')}_{sweep}.png"
+            if curves(path, lines, label, y, f"{name} over {label}".capitalize()):
+                files.append(path)
     drifts = {}
     for walk in ("exact", "add", "subtract"):
         steps, errors = zip(*drift(walk))
         drifts[walk] = list(zip(steps, np.maximum.accumulate(errors)))  # the largest so far
     if curves(folder / "drift.png", drifts, "steps along a row of cells", "largest error of t so far, in 2^-52 of the row's length", "3D-DDA: drift"):
         files.append(folder / "drift.png")
-    depth = {"two facing mirrors": [(d, seconds) for d, seconds, _ in mirror_times()]}
-    if curves(folder / "depth.png", depth, "recursion depth", "seconds for 4 x 4 pixels", "Time over recursion depth"):
-        files.append(folder / "depth.png")
+    depths = {name: between_mirrors(name) for name in MIRRORED}
+    for name, column, y in (("time", 1, "time of a ray over that at depth 10"), ("error", 3, "largest error of a pixel, in 2^-24")):
+        unit = {key: dict((d[0], d[1]) for d in points)[10] if name == "time" else 1.0 for key, points in depths.items()}
+        if curves(folder / f"{name}_depth.png", {key: [(d[0], d[column] / unit[key]) for d in points] for key, points in depths.items()},
+                  "recursion depth between two facing mirrors", y, f"{name} over recursion depth".capitalize()):
+            files.append(folder / f"{name}_depth.png")
     return files

@@ -10,6 +10,7 @@ import numpy as np
 
 from ...scene.layout import to_world
 from ...scene.scene import Mesh
+from ..exact import nearest
 
 
 @dataclass
@@ -142,6 +143,48 @@ def aimed_inside(scene, rng, n):
     return Batch(o, on - o, must="hit")
 
 
+def from_the_middle(scene, rng, n):
+    """From all but one point in the middle, to all sides."""
+    centre, size = frame(scene)
+    return Batch(centre + 1e-3 * size * rng.normal(size=(n, 3)), rng.normal(size=(n, 3)))
+
+
+def from_the_gap(scene, rng, n):
+    """From between two shells, the first object's and the second's, whose vertices correspond: across the gap and along it."""
+    inner, outer = (o.geometry for o in scene.objects)
+    pick = inner.triangles[rng.integers(len(inner), size=n)]
+    weight = rng.dirichlet((1.0, 1.0, 1.0), n)[..., None]
+    o = 0.5 * sum((mesh.vertices[pick] * weight).sum(axis=1) for mesh in (inner, outer))
+    return Batch(o, rng.normal(size=(n, 3)), must="hit")
+
+
+def with_ends(scene, rng, n):
+    """Rays that begin or end exactly where they meet the first triangle, or one float before or behind; beginning at -0.0, too."""
+    batch, corners = mixed_rays(scene, rng, n), corners_of(scene).tolist()
+    for r in range(len(batch)):
+        met = nearest(batch.o[r].tolist(), batch.d[r].tolist(), corners)
+        if met is None:
+            batch.t_min[r] = -0.0
+            continue
+        t, which = float(met[0]), r % 6
+        if which < 3:
+            batch.t_max[r] = (t, np.nextafter(t, -math.inf), np.nextafter(t, math.inf))[which]
+            batch.t_min[r] = -0.0
+        else:
+            batch.t_min[r] = (t, np.nextafter(t, -math.inf), np.nextafter(t, math.inf))[which - 3]
+    return batch
+
+
+def from_nowhere(scene, rng, n):
+    """From lattice points in and around a scene, those on planes of division among them, along axes and diagonals and to points near its corners."""
+    lo, hi = scene.bounds()
+    o = lo + (hi - lo) * rng.integers(-1, 18, (n, 3)) / 16.0
+    d = lo + (hi - lo) * rng.choice((0.0, 0.03, 0.0625, 0.95, 1.0), (n, 3)) - o
+    d[: n // 2] = rng.integers(-1, 2, (n // 2, 3))
+    d[~d.any(axis=1)] = (0.0, -0.0, 1.0)
+    return Batch(o, d)
+
+
 def grazing(scene, rng, n):
     """Half a degree off the planes of triangles, at points on and beside them."""
     corners = corners_of(scene)
@@ -154,6 +197,11 @@ def grazing(scene, rng, n):
     at = (pick * (weight / weight.sum(axis=1, keepdims=True))[..., None]).sum(axis=1)
     at[::2] += 1e-3 * length[::2] * rng.normal(size=at[::2].shape)
     return Batch(at - 2.0 * length * d, d)
+
+
+def few(scene, rng, n):
+    """Four rays, two of which hit the triangles of `identical`."""
+    return Batch([(0.2, 0.2, 5.0), (0.9, 0.9, 3.0), (0.1, 0.1, -2.0), (5.0, 5.0, 5.0)], [(0, 0, -1), (0, 0, -1), (0, 0, 1), (0, 0, 1)])
 
 
 def one_ray(o, d, must=""):

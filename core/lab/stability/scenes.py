@@ -56,6 +56,14 @@ def star(rng):
     return Scene.from_triangles(vertices, mesh.triangles)
 
 
+def shells(gap):
+    """Two closed meshes, one in the other, nearer to each other than any offset of a fixed size."""
+    def make(rng):
+        mesh = ball(rng)
+        return Scene([Object("inner", mesh), Object("outer", Mesh(mesh.vertices * (1.0 + gap), mesh.triangles))])
+    return make
+
+
 def sheet(rng, n=6, z=0.25):
     """An axis-aligned plane of squares: no extent along z, edges on planes of division."""
     x, y = np.meshgrid(np.arange(n + 1.0), np.arange(n + 1.0), indexing="ij")
@@ -67,10 +75,20 @@ def sheet(rng, n=6, z=0.25):
 
 def blocks(rng, n=3):
     """Cubes of triangles edge to edge: coincident faces, everything on planes of division."""
+    return soup(corners_of_blocks(np.stack(np.meshgrid(*[np.arange(n, dtype=float)] * 3, indexing="ij"), axis=-1).reshape(-1, 3)[::2]))
+
+
+def corners_of_blocks(places):
+    """Triangles of unit cubes."""
     corner = np.array([[i >> 2 & 1, i >> 1 & 1, i & 1] for i in range(8)], float)
     faces = [(0, 1, 3), (0, 3, 2), (4, 6, 7), (4, 7, 5), (0, 4, 5), (0, 5, 1), (2, 3, 7), (2, 7, 6), (0, 2, 6), (0, 6, 4), (1, 5, 7), (1, 7, 3)]
-    places = np.stack(np.meshgrid(*[np.arange(n, dtype=float)] * 3, indexing="ij"), axis=-1).reshape(-1, 3)[::2]
-    return soup(np.concatenate([corner[np.array(faces)] + p for p in places]))
+    return np.concatenate([corner[np.array(faces)] + p for p in places])
+
+
+def corner_blocks(rng):
+    """A cube of triangles in each corner of a large box: what lies between is one empty region."""
+    corners = corners_of_blocks(np.array([(0, 0, 0), (0, 0, 15), (0, 15, 0), (0, 15, 15), (15, 0, 0), (15, 0, 15), (15, 15, 0), (15, 15, 15)], float))
+    return soup(corners)
 
 
 def identical(count):
@@ -110,6 +128,13 @@ def slivers(aspect):
     return make
 
 
+def fan(rng):
+    """A sheet of triangles with a corner in common, each narrower than the last: 1 to 1e12 times as long as wide."""
+    z = [-1.0, *(-(10.0**-k) for k in range(1, 13)), 0.0, *(10.0**-k for k in range(12, 0, -1)), 1.0]
+    vertices = np.array([(0.0, 0.0, 0.0), *((2.0, 0.0, x) for x in z)])
+    return Scene.from_triangles(vertices, [(0, k, k + 1) for k in range(1, len(z))])
+
+
 def stadium(rng):
     """A tiny detailed object in a huge plain one."""
     mesh = ball(rng, 6)
@@ -134,18 +159,55 @@ def copies(rng):
 
 
 def shapes(rng):
-    """Solids inside one another and side by side, with a 144-gon that is not convex."""
+    """Solids inside one another and side by side, with a 144-gon that is not convex, once more with each corner twice."""
     angle = np.linspace(0.0, math.tau, 144, endpoint=False)
     radius = np.where(np.arange(144) % 2, 0.4, 0.9)
     gon = np.stack([radius * np.cos(angle), radius * np.sin(angle), np.full(144, -1.5)], axis=1)
     some = [solids.sphere((0, 0, 0), 1.0), solids.sphere((0, 0, 0), 0.5), solids.box((2, -1, -1), (4, 1, 1)), solids.polygon(gon),
-            solids.cylinder((0, 3, -1), (0, 3, 1), 0.7), solids.cone((0, -3, -1), (0, -3, 1), 0.8), solids.sphere((2, 0, 0), 1.0)]
+            solids.cylinder((0, 3, -1), (0, 3, 1), 0.7), solids.cone((0, -3, -1), (0, -3, 1), 0.8), solids.sphere((2, 0, 0), 1.0), solids.polygon((gon + (0.0, 0.0, 5.0)).repeat(2, axis=0))]
     return Scene([Object("shapes", Shapes(some)), Object("nothing", Mesh([], [])), Object("loose edges", Mesh(rng.random((4, 3)), []))])
+
+
+def solids_under_matrices(rng):
+    """One of each solid under a mirrored, a sheared, a large, a turned and a flat matrix; the flat one has to be left out."""
+    turn = np.linalg.qr(rng.normal(size=(3, 3)))[0]
+    linear = {"mirrored": np.diag([-1.0, 1.0, 1.0]), "sheared": [(1.0, 0.5, 0.0), (0.0, 1.0, -0.3), (0.0, 0.0, 0.8)], "large": -100.0 * np.eye(3), "turned": 0.3 * turn,
+              "flat": np.diag([1.0, 1.0, 0.0])}
+    some = [solids.sphere((0, 0, 0), 1.0), solids.box((1.5, -1, -1), (3.5, 1, 1)), solids.cylinder((0, 3, -1), (0, 3, 1), 0.7), solids.cone((0, -3, -1), (0, -3, 1), 0.8)]
+    objects = []
+    for k, (name, part) in enumerate(linear.items()):
+        matrix = np.eye(4)
+        matrix[:3, :3], matrix[:3, 3] = part, (0.0, 9.0 * k, 500.0 if name == "large" else 0.0)
+        objects.append(Object(name, Shapes(some), matrix))
+    return Scene(objects)
+
+
+#: What has to be refused when the scene is made, and the words that have to say why.
+REFUSED = {
+    "a negative index": (lambda rng: Mesh(rng.random((9, 3)), [(0, 1, 2), (3, -1, 5)], name="Suzanne"), ("Suzanne", "triangle 1", "-1")),
+    "an index out of range": (lambda rng: Mesh(rng.random((9, 3)), [(0, 1, 2), (3, 4, 9)], name="Suzanne"), ("Suzanne", "triangle 1", "9 vertices")),
+    "a huge index": (lambda rng: Mesh(rng.random((9, 3)), [(2**62, 1, 2)], name="Suzanne"), ("Suzanne", "triangle 0", "9 vertices")),
+    "indices that are no whole numbers": (lambda rng: Mesh(rng.random((9, 3)), [(0.0, math.nan, 2.0)], name="Suzanne"), ("Suzanne", "whole numbers")),
+    "one index in 32 of random bits": (lambda rng: bad_indices(rng), ("Suzanne", "vertex indices")),
+}
+
+
+def bad_indices(rng):
+    """A mesh one in 32 of whose indices has random bits."""
+    triangles = rng.integers(0, 60, (40, 3))
+    triangles.ravel()[rng.permutation(120)[:120 // 32 + 1]] = rng.integers(-2**63, 2**63, 120 // 32 + 1)
+    return Mesh(rng.random((60, 3)), triangles, name="Suzanne")
 
 
 def spheres(scale=1.0, offset=0.0):
     return lambda rng: Scene([Object("spheres", Shapes([solids.sphere(scale * c + offset, scale * r)
                                                         for c, r in zip(rng.random((12, 3)), 0.05 + 0.15 * rng.random(12))]))])
+
+
+def room_of_solids(rng):
+    """A box within a ball, and balls within the box: seen from within, nothing leaves it."""
+    some = [solids.sphere((0, 0, 0), 4.0), solids.box((-2, -2, -2), (2, 2, 2)), *(solids.sphere(c, 0.3) for c in rng.uniform(-1.5, 1.5, (5, 3)))]
+    return Scene(solids=some)
 
 
 def tangent_spheres(rng=None):

@@ -2,22 +2,33 @@
 
 import numpy as np
 
-from .rays import Batch, frame
-from .trial import asked, generator
+from ...scene.scene import Mesh
+from .rays import Batch
+from .trial import asked, generator, size_of
+
+#: A curved surface may be met again by a ray that leaves it, but not nearer than this part of the scene's size.
+NEAR = 1e-9
 
 
-def spawned(index, batch, hits, rng, core):
-    """Rays that leave the surfaces hit, to the side that they were met from, at all angles down to grazing ones.
+def spawned(index, case, scene, n, seed, core):
+    """Rays that leave surfaces met from within a closed scene: 4 n from all that `case.inside` aims at, case.from_one from the first.
 
     Returns
     -------
     Batch
-        Each must hit, in a closed mesh met from within.
-    start : ndarray
-        Primitives that they leave.
+        Each must hit.
     """
+    rng = generator(case, seed, 2)
+    inner = case.inside(scene, rng, n)
+    hits = asked(inner, index)
     found = np.flatnonzero((hits.primitive >= 0) & (hits.normal != 0.0).any(axis=1))
-    found = found[rng.integers(len(found), size=4 * len(found))] if len(found) else found
+    if not len(found):
+        return inner.take(found)
+    return leave(hits, inner, np.concatenate([found[rng.integers(len(found), size=4 * n)], np.repeat(found[:1], case.from_one)]), rng, core)
+
+
+def leave(hits, batch, found, rng, core):
+    """Rays that leave the surfaces hit by some rays, to the side that they were met from, at all angles down to grazing ones."""
     normal = hits.normal[found]
     normal = np.where(((normal * batch.d[found]).sum(axis=1) > 0.0)[:, None], -normal, normal)
     d = rng.normal(size=normal.shape)
@@ -33,12 +44,11 @@ def spawned(index, batch, hits, rng, core):
     else:
         from ...pure.tracing.vectors import pushed
         o = np.array([pushed(tuple(hits.point[k]), hits.error[k], tuple(n), tuple(x)) for k, n, x in zip(found, normal.tolist(), d.tolist())])
-    return Batch(o.reshape(-1, 3), d, leaving=np.stack([hits.object[found], hits.primitive[found]]).astype(np.int64)), hits.primitive[found]
+    return Batch(o.reshape(-1, 3), d, leaving=np.stack([hits.object[found], hits.primitive[found]]).astype(np.int64))
 
 
-def spawned_inside(index, case, scene, got, batch, seed, core):
-    """Rays spawned from hits that were met from within."""
-    centre, size = frame(scene)
-    rng = generator(case, seed, 2)
-    inner = Batch(np.broadcast_to(centre, (len(batch), 3)) + 1e-3 * size * rng.normal(size=(len(batch), 3)), rng.normal(size=(len(batch), 3)))
-    return spawned(index, inner, asked(inner, index), rng, core)
+def met_again(hits, batch, scene):
+    """Bool per ray: whether it has met the surface that it leaves."""
+    same = (hits.object == batch.leaving[0]) & (hits.primitive == batch.leaving[1])
+    flat = np.array([isinstance(o.geometry, Mesh) for o in scene.objects])[batch.leaving[0]]
+    return same & (flat | (hits.t < NEAR * size_of(scene)))

@@ -13,8 +13,8 @@ from .examine import examine
 from .examine_pictures import examined
 from .pictures import pictures
 from .single import single_precision
-from .trial import RAYS, asked, built, scene_and_rays
-from .truth import truth_row
+from .trial import given
+from .truth import refusals, truth_row
 
 
 def contestants(names=None):
@@ -22,9 +22,15 @@ def contestants(names=None):
     return [(row.name, core) for row in techniques() if row.family != "peers" and (names is None or row.name in names) for core in row.cores]
 
 
+def variants(name, core):
+    """Parameters of a technique that promise the same hits: every choice and switch besides the defaults, one at a time."""
+    return [{p.name: value} for p in technique(name).parameters if p.choices or p.type is bool
+            for value in (p.choices_in(core) if p.choices else (False, True)) if value != p.default_in(core) and value not in p.inexact]
+
+
 def takes(name, case):
-    """Whether a technique serves the kinds of primitive in a case."""
-    return technique(name).primitives == "all" or not case.kinds - {technique(name).primitives}
+    """Whether a technique serves the kinds of primitive in a case, and the case is one for it."""
+    return (not case.only or name in case.only) and (technique(name).primitives == "all" or not case.kinds - {technique(name).primitives})
 
 
 class Kept:
@@ -125,23 +131,23 @@ def run(full=False, seed=0, names=None, only=None, seconds=None, timed=True, say
 
     def rays_work(case):
         """The rows of a case with rays."""
-        scene, batch = scene_and_rays(case, seed, RAYS[full])
-        right = asked(batch, built(case, scene, "brute", "pure"))
+        scene, batch, right = given(case, seed, full)
         record = {"truth": truth_row(case, scene, batch, right, full), "rows": [], "left_out": []}
         for name, core in contestants(names):
             if core not in case.cores:
                 continue
             if not takes(name, case):
-                record["left_out"].append(f"{case.name}: {name} takes only primitives of the kind {technique(name).primitives}.")
+                record["left_out"].append(f"{case.name}: not with {name}.")
                 continue
-            try:
-                row = examine(case, scene, batch, right, name, core, seed, base.get((name, core)), timed)
-            except RayscopeError:
-                raise
-            except Exception as error:                                  # a technique that breaks is a finding, not our end
-                row = {"case": case.name, "technique": name, "core": core, "rays": len(batch), "bad": list(range(len(batch))),
-                       "verdict": f"broke: {type(error).__name__}: {error}"}
-            record["rows"].append(row)
+            for parameters in [{}, *(variants(name, core) if full and case.varied else ())]:
+                try:
+                    row = examine(case, scene, batch, right, name, core, seed, base.get((name, core)), timed and not parameters, parameters)
+                except RayscopeError:
+                    raise
+                except Exception as error:                              # a technique that breaks is a finding, not our end
+                    row = {"case": case.name, "technique": name, "core": core, "rays": len(batch), "parameters": parameters,
+                           "bad": list(range(len(batch))), "verdict": f"broke: {type(error).__name__}: {error}"}
+                record["rows"].append(row)
         return record
 
     def pictures_work(case):
@@ -154,13 +160,14 @@ def run(full=False, seed=0, names=None, only=None, seconds=None, timed=True, say
             continue
         left_out += record["left_out"]
         for row in record["rows"]:
-            if case.name in first and "seconds" in row:
+            if case.name in first and "seconds" in row and not row.get("parameters"):
                 (base if case in everything else pace)[row["technique"], row["core"]] = row
         if case in everything:
             truths.append(record["truth"])
             rows += record["rows"]
         else:
             drawn_rows += record["rows"]
+    truths += refusals(seed) if not only else []
     say("float32")
     single = single_precision([c for c in chosen if c in everything], seed) if names is None else []
     failures = [r for r in rows + truths + drawn_rows + single if not r["verdict"].startswith(("ok", "refused"))]

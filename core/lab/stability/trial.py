@@ -38,6 +38,12 @@ def scene_and_rays(case, seed, n):
         return scene, case.rays(scene, generator(case, seed, 1), n)
 
 
+def given(case, seed, full):
+    """A case's scene, its rays, and what brute force finds: the pure core's, where the case is one for that."""
+    scene, batch = scene_and_rays(case, seed, case.n or RAYS[full])
+    return scene, batch, asked(batch, built(case, scene, "brute", case.cores[0]))
+
+
 def built(case, scene, name, core, **more):
     """A technique over a case's scene, with the parameters that the case wants."""
     with instances_kept(case), np.errstate(all="ignore"):
@@ -51,6 +57,11 @@ def asked(batch, index, **more):
     for name in ("t", "primitive", "object", "normal", "point", "error", *(("n_it", "n_ts") if more.get("count") else ())):
         setattr(hits, name, np.asarray(getattr(hits, name)))
     return hits
+
+
+def variant_text(name, parameters):
+    """A technique with its parameters, in words."""
+    return ", ".join([name, *(f"{key} = {value}" for key, value in parameters.items())])
 
 
 def size_of(scene):

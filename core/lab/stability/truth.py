@@ -1,12 +1,15 @@
 """Brute force (the pure core's) against exact arithmetic, and against what a case says by itself."""
 
 import math
+import zlib
 
 import numpy as np
 
+from ...errors import SceneError
 from ...scene.scene import Mesh
 from .. import exact
 from .rays import corners_of
+from .scenes import REFUSED
 from .trial import EPSILON, T_BOUND, lengths, size_of
 
 #: A ray that passes an edge by less than this part of the coordinates may be taken for either side.
@@ -27,7 +30,7 @@ def truth(case, scene, batch, hits):
         of EPSILON * max(|t|, size of the scene). off_surface : largest distance of the ray's point at t from the
         primitive, in units of EPSILON * the largest coordinate. bad : numbers of the rays that failed.
     """
-    balls = [s for o in scene.objects if not isinstance(o.geometry, Mesh) for s in o.geometry.solids]
+    balls = [s for o in scene.objects if not isinstance(o.geometry, Mesh) for s in o.geometry.solids]     # and boxes
     corners = corners_of(scene)
     numbers = [(i, k) for i, o in enumerate(scene.objects) if isinstance(o.geometry, Mesh) for k in np.flatnonzero(o.geometry.usable)]
     row = dict(rays=0, lost=0, ghost=0, wrong=0, t_ulp=0.0, t_relative=0.0, t_error=0.0, off_surface=0.0, bad=[])
@@ -41,7 +44,7 @@ def truth(case, scene, batch, hits):
         coordinates = max(max(map(abs, o)), float(np.abs(corners).max(initial=0.0)), *(float(np.abs(s.matrix).max()) for s in balls), 0.0)
         slack = EDGE * coordinates
         if balls:
-            right = _nearest_ball(o, d, balls)
+            right = _nearest_solid(o, d, balls)
         else:
             right = exact.nearest(o, d, lists, batch.t_min[r], batch.t_max[r])
         hit = hits.primitive[r] >= 0
@@ -55,8 +58,9 @@ def truth(case, scene, batch, hits):
             number = int(hits.primitive[r]) if balls else place[int(hits.object[r]), int(hits.primitive[r])]
             at = [x + exact.Fraction(t) * y for x, y in zip(exact.fractions(o), exact.fractions(d))]
             if balls:
-                off = abs(math.dist(map(float, at), balls[number].matrix[:3, 3]) - balls[number].matrix[0, 0])
-                own = right[0] if right and number in right[1] else None
+                off = abs(_beyond(balls[number], at))
+                span = _span(o, d, balls[number])
+                own = min(span, key=lambda x: abs(x - exact.Fraction(t))) if span else None
             else:
                 mine = lists[number]
                 off = math.sqrt(exact.squared_distance(at, *mine))
@@ -81,11 +85,29 @@ def truth(case, scene, batch, hits):
     return row
 
 
-def _nearest_ball(o, d, balls):
-    """The nearest sphere met at t >= 0."""
+def _span(o, d, solid):
+    """Where a ray enters and leaves a sphere or a box along the axes, or None."""
+    centre, half = solid.matrix[:3, 3].tolist(), np.diagonal(solid.matrix)[:3].tolist()
+    if solid.kind == "sphere":
+        return exact.sphere(o, d, centre, half[0])
+    lo, hi = ([exact.Fraction(x) + sign * exact.Fraction(y) for x, y in zip(centre, half)] for sign in (-1, 1))
+    return exact.box(o, d, lo, hi)
+
+
+def _beyond(solid, at):
+    """How far a point is outside a solid; inside, negative."""
+    away = [float(x - exact.Fraction(y)) for x, y in zip(at, solid.matrix[:3, 3].tolist())]
+    if solid.kind == "sphere":
+        return math.hypot(*away) - float(solid.matrix[0, 0])
+    beyond = [abs(x) - float(h) for x, h in zip(away, np.diagonal(solid.matrix))]
+    return math.hypot(*(max(x, 0.0) for x in beyond)) or max(beyond)
+
+
+def _nearest_solid(o, d, balls):
+    """The nearest sphere or box met at t >= 0."""
     found = []
     for k, s in enumerate(balls):
-        span = exact.sphere(o, d, s.matrix[:3, 3].tolist(), float(s.matrix[0, 0]))
+        span = _span(o, d, s)
         if span and span[1] >= 0:
             found.append((span[0] if span[0] >= 0 else span[1], k))
     if not found:
@@ -105,8 +127,10 @@ def _sure(o, d, right, lists, balls, slack, within=(-math.inf, math.inf)):
     at = [float(x + t * y) for x, y in zip(exact.fractions(o), exact.fractions(d))]
     for k in numbers:
         if balls:
-            span = exact.sphere(o, d, balls[k].matrix[:3, 3].tolist(), float(balls[k].matrix[0, 0]))
-            if float(span[1] - span[0]) * max(map(abs, d)) > 1e-4 * balls[k].matrix[0, 0]:
+            span = _span(o, d, balls[k])
+            deepest = [x + (span[0] + span[1]) / 2 * y for x, y in zip(exact.fractions(o), exact.fractions(d))]
+            # Where a sphere is all but touched, how deep a ray gets is the square of how far it runs within.
+            if -_beyond(balls[k], deepest) > (1e-9 * balls[k].matrix[0, 0] if balls[k].kind == "sphere" else slack):
                 return True
             continue
         a, b, c = (np.array(p) for p in lists[k])
@@ -130,6 +154,30 @@ def truth_row(case, scene, batch, right, full):
         row |= truth(case, scene, part, picked)
         row["bad"] = some[row["bad"]].tolist()
     failed = [f"{row.get(k)} {k}" for k in ("lost", "ghost", "wrong", "leaks") if row.get(k)]
+    for name in case.told:
+        if not any(notice.name.startswith(name) for notice in scene.notices):
+            failed.append(f"nothing is said of what is wrong with {name}")
+        if not (right.primitive >= 0).any():
+            failed.append(f"the neighbours of what is wrong with {name} are not hit")
     if row.get("t_error", 0.0) > T_BOUND / EPSILON:
         failed.append(f"t off by {row['t_error']:.3g}")
     return row | {"verdict": ", ".join(failed) or "ok"}
+
+
+def refusals(seed):
+    """What cannot be traced is refused, by name: a row for each of REFUSED."""
+    return [refusal(name, seed) for name in REFUSED]
+
+
+def refusal(name, seed):
+    """One row of them."""
+    make, words = REFUSED[name]
+    row = {"case": name, "technique": "scene", "core": "pure", "rays": 0, "bad": []}
+    try:
+        make(np.random.default_rng([seed, zlib.crc32(name.encode())]))
+    except SceneError as error:
+        missing = [word for word in words if word not in str(error)]
+        return row | {"verdict": f"the message lacks {', '.join(missing)}: {error}" if missing else "ok"}
+    except Exception as error:
+        return row | {"verdict": f"broke: {type(error).__name__}: {error}"}
+    return row | {"verdict": "was not refused"}
