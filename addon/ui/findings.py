@@ -5,7 +5,7 @@ import textwrap
 import bpy
 
 from .operators import Work
-from .panels import Sidebar, draw_job
+from .panels import Sidebar, characters, draw_job
 from .. import inspection
 
 #: Rows and findings shown, at most.
@@ -32,7 +32,8 @@ class RAYSCOPE_OT_inspect(Work, bpy.types.Operator):
             return "The inspection was stopped: the findings shown are the previous ones"
         task.keep(job.result)
         result, warned = job.result
-        return f"{len(result.findings)} findings and {len(warned)} warnings after {result.rays:,} rays"
+        found = ", ".join(f"{n} {word}{'s' * (n != 1)}" for n, word in ((len(result.findings), "finding"), (len(warned), "warning")))
+        return f"{found} after {result.rays:,} rays"
 
 
 class RAYSCOPE_OT_select(bpy.types.Operator):
@@ -107,7 +108,7 @@ class RAYSCOPE_PT_findings(Sidebar, bpy.types.Panel):
         if result is None:
             return
         draw_costs(layout, result)
-        width = max(24, context.region.width // 8)
+        width = characters(context)
         if not result.findings:
             layout.label(text="Nothing to improve was found", icon="CHECKMARK")
         for finding in result.findings[:SHOWN]:
@@ -125,7 +126,7 @@ class RAYSCOPE_PT_warnings(Sidebar, bpy.types.Panel):
         self.layout.label(text=str(len(inspection.warnings_of(context.scene))), icon="ERROR")
 
     def draw(self, context):
-        width = max(24, context.region.width // 8)
+        width = characters(context)
         for finding in inspection.warnings_of(context.scene)[:SHOWN]:
             draw_finding(self.layout, finding, width)
 

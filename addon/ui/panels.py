@@ -57,14 +57,21 @@ def draw_figures(layout, scene):
     rays = session.rays_of(scene)
     if rays:
         counted = [name for name in ("N_IT", "N_TS") if all(name in row for row in rays.values())]
-        table = layout.grid_flow(row_major=True, columns=2 + len(counted), even_columns=False, align=True)
-        for text in ("Rays", "", *counted):
-            table.label(text=text)
+        column = layout.column(align=True)
+        draw_line(column, "Rays", "", *counted)
         for kind, row in rays.items():
-            table.label(text=kind.title())
-            table.label(text=f"{row['rays']:,}")
-            for name in counted:
-                table.label(text=f"{row[name]:.3g}")
+            draw_line(column, kind.title(), f"{row['rays']:,}", *(f"{row[name]:.3g}" for name in counted))
+
+
+def draw_line(layout, first, *numbers):
+    """A line of a table: a name on the left, numbers on the right."""
+    split = layout.split(factor=0.35)
+    split.label(text=first)
+    row = split.row()
+    for number in numbers:
+        cell = row.row()
+        cell.alignment = "RIGHT"
+        cell.label(text=number)
 
 
 def draw_overlay(layout, scene):
@@ -98,6 +105,11 @@ def _ends(built, *choice):
         from ..show.overlay_data import scale
         built.ends[choice] = scale(built.cells, *choice)
     return built.ends[choice]
+
+
+def characters(context):
+    """About how many characters go into a line of a panel."""
+    return max(24, int(context.region.width / (7.5 * context.preferences.system.ui_scale)))
 
 
 def draw_notices(layout, scene, width):
@@ -209,7 +221,7 @@ class Notices:
         self.layout.label(text=str(len(session.notices_of(context.scene))))
 
     def draw(self, context):
-        draw_notices(self.start(), context.scene, max(24, context.region.width // 8))
+        draw_notices(self.start(), context.scene, characters(context))
 
 
 class RAYSCOPE_PT_structure(Sidebar, Structure, bpy.types.Panel):

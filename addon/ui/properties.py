@@ -95,7 +95,7 @@ def _figure(name):
     def get(self):
         value = session.figures_of(self.id_data).get(name)
         return "" if value is None else shown(name, value)
-    return StringProperty(name=name, description=FIGURES[name][:1].upper() + FIGURES[name][1:], get=get,
+    return StringProperty(name=name.replace("_", " ").capitalize() if name.islower() else name, description=FIGURES[name][:1].upper() + FIGURES[name][1:], get=get,
                           set=lambda self, text: None)  # without a setter Blender greys the text out
 
 
