@@ -3,17 +3,19 @@
 from dataclasses import replace
 from pathlib import Path
 
-from ..arguments import picture_size, seed, whole
+from ..arguments import DEFAULT_SIDE, picture_size, proportional, seed, whole
 from ..errors import MissingPackageError, ParameterError
-from ..lab import against_brute, antialiasing, automatic, bench, directional, division, report
+from ..lab import against_brute, antialiasing, automatic, bench, directional, division, generalised, report
 from ..outcome import DONE, FAILED, Outcome, say
+from ..scene.files import read_file
 
 
 def options(sub):
     sub.add_argument("--subdivisions", type=whole(0, 6), default=4,
                      help="of the monkey; 4 gives 272k triangles with the ground")
     sub.add_argument("--size", metavar="WxH", type=picture_size,
-                     help="primary rays; without it 512x512, for --adaptive 128x96, for --automatic 240x180")
+                     help="primary rays; without it 512x512, for --adaptive 128x96, for --automatic 240x180, "
+                     "for --generalised 72 on the longer side")
     sub.add_argument("--repeats", type=whole(1, 100), default=5, help="of everything; for --adaptive: seeds")
     sub.add_argument("--seed", type=seed, default=0)
     sub.add_argument("--growth", action="store_true", help="also how times grow from 1k to 1M triangles")
@@ -30,9 +32,14 @@ def options(sub):
     sub.add_argument("--adaptive", action="store_true",
                      help="instead: error, rays and time of adaptive antialiasing against 16 uniform samples, "
                      "on the examples")
+    sub.add_argument("--generalised", metavar="FILE", nargs="*",
+                     help="instead: error and time of cones, pyramids and beams beside sampled rays, in a room of "
+                     "polygons and these scenes; without FILE, in the interior among the examples")
 
 
 def run(call):
+    if call.generalised is not None:
+        return _generalised(call)
     if call.adaptive:
         return _adaptive(call)
     if call.automatic:
@@ -73,6 +80,23 @@ def _automatic(call):
         text += f"\n\nOver {best:.0%} slower than the best, or over {bvh:.0%} slower than bvh: {', '.join(missed)}."
     record = report.record("bench", None, None, {"automatic": True, "size": size, "only": only}, rows=rows, missed=missed)
     return Outcome(text, record, FAILED if missed else DONE)
+
+
+def _generalised(call):
+    if call.generalised:
+        scenes = (replace(read_file(path, call.open_in_blender, call.size), name=Path(path).stem) for path in call.generalised)
+    else:
+        scenes = _examples(call, call.size, "interior.blend")
+    sized = ((scene, call.size or _small(scene.camera)) for scene in scenes)
+    result = generalised.generalised(sized, call.repeats, call.seed, say=say)
+    asked = {"generalised": call.generalised, "size": call.size, "repeats": call.repeats}
+    record = report.record("bench", None, call.seed, asked, **result)
+    return Outcome(generalised.text(result), record, FAILED if result["missed"] else DONE)
+
+
+def _small(camera):
+    """Size of a picture that a bench of whole pictures takes minutes for."""
+    return tuple(max(1, round(generalised.SIDE / DEFAULT_SIDE * side)) for side in proportional(camera))
 
 
 def _directional(call):

@@ -4,29 +4,18 @@ import math
 
 import numpy as np
 
-from rayscope.core import Camera, Light, Material, Mesh, Object, Scene, World, solids
+from rayscope.core import Camera, Light, Material, Mesh, Object, Scene, solids
+from rayscope.core.lab.rooms import ball_on_floor, lamp, panel
 
 
 def lit(*more, radius=0.4, mirror=0.7, lights=None, wall=None):
     """A ball on a floor before a wall, under a soft light; `more` are further solids."""
-    floor = Mesh(np.array([(-9, -9, 0), (9, -9, 0), (0, 15, 0)], float), [(0, 1, 2)])
-    back = Mesh(np.array([(-2, 2, 0), (3, 2, 0), (0, 3, 4)], float), [(0, 1, 2)])
-    return Scene(
-        [Object("floor", floor), Object("wall", back, materials=(wall or Material("wall", mirror=mirror),))],
-        lights or [Light("lamp", "point", (50, 50, 50), (3, -3, 4), radius=radius)],
-        Camera.look_at((0, -6, 3), (0, 0, 0.6), angle=math.radians(40), aspect=4 / 3),
-        World((0.2, 0.3, 0.5)),
-        solids=[solids.sphere((0, 0, 0.7), 0.7), *more],
-    )
+    return ball_on_floor(lights or [lamp(radius)], mirror, wall, more)
 
 
 def with_area(shape):
     """The same under an area light."""
-    axes = ((0.8, 0.8, 0.0), (0.5, -0.5, 0.6))
-    return lit(
-        mirror=0.0,
-        lights=[Light("a", "area", (20, 20, 20), (2, -2, 4), direction=(-0.4, 0.4, -0.8), axes=axes, shape=shape)],
-    )
+    return ball_on_floor(panel(shape))
 
 
 def with_glass():
