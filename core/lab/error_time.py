@@ -2,7 +2,10 @@
 
 Every knob that the scene has something for is swept, each setting traced several times, turn by turn with all others.
 The reference is a picture with at least `FINER` times the samples of the finest setting, in two halves with different
-random numbers: half their difference is its own error, below which nothing can be told apart.
+random numbers: half their difference is its own error, below which nothing can be told apart. That the error of random
+samples falls with the root of their number is the check on it all.
+
+Techniques that trace the same rays are compared with the picture of the same samples: exact ones have no error.
 """
 
 import base64
@@ -14,7 +17,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ..catalogue import build
-from ..errors import Cancelled, MissingPackageError, SceneError
+from ..errors import Cancelled, MemoryEstimateError, MissingPackageError, RayscopeError, SceneError
 from ..rendering import trace
 from . import report
 from .picture_error import MEASURES, STEP, displayed, errors
@@ -22,7 +25,7 @@ from .picture_error import MEASURES, STEP, displayed, errors
 #: The reference has so many times the samples of the finest setting.
 FINER = 16
 #: Cost of the whole run for each sample a pixel of the finest setting: the reference, the counting and the timed runs.
-RUNS = FINER + 30
+RUNS = FINER + 50
 #: Samples a pixel that are worth sweeping up to.
 MOST, FEWEST = 1024, 2
 #: Points measured however little time there is.
@@ -34,7 +37,11 @@ OVERTIME = 8.0
 #: What ends the paths in all pictures that are not about that, without a bias, and the depths that are tried.
 UNBIASED = {"threshold": 0.003, "roulette": True}
 DEPTHS = (8, 16, 32, 64, 128, 256)
-COLUMNS = ("curve", "setting", "T", "T_worst", "runs", "rays", "tests", *MEASURES, "verdict")
+#: Techniques of the same samples: exact ones, and those that find triangles in float32.
+TECHNIQUES, FLOAT32 = ("kd-tree", "grid", "octree"), ("embree", "mathutils")
+#: What random sampling is checked by: slope of error against samples, and how far it may be off, relatively.
+SLOPE, SLACK = -0.5, 0.15
+COLUMNS = ("curve", "setting", "T", "T_worst", "runs", "rays", "tests", *MEASURES, "against", "verdict")
 
 
 @dataclass
@@ -52,14 +59,16 @@ class Setting:
         0: as it is; n: its curved solids as meshes, n segments around.
     technique : str
         What traces it, where that is not the technique of the whole run.
+    same : bool
+        Its error is against the picture that the technique of the whole run makes of the same samples.
     times : list of float
         Seconds of the timed runs, tracing alone.
     rays, tests : int
         Of all kinds; intersection tests ray x primitive.
     error : dict
         See :func:`~.picture_error.errors`.
-    given_up : float
-        Seconds after which it was given up; 0 if it was not.
+    why : str
+        It could not be measured, if it could not.
     verdict : str
     """
 
@@ -69,11 +78,12 @@ class Setting:
     options: dict
     scene: int = 0
     technique: str = ""
+    same: bool = False
     times: list = field(default_factory=list)
     rays: int = 0
     tests: int = 0
     error: dict = field(default_factory=dict)
-    given_up: float = 0.0
+    why: str = ""
     verdict: str = ""
 
     def row(self):
@@ -88,6 +98,7 @@ class Setting:
             "rays": self.rays,
             "tests": self.tests,
             **self.error,
+            "against": "same samples" if self.same else "reference",
             "verdict": self.verdict,
             "options": {**self.options, **({"technique": self.technique} if self.technique else {})},
         }
@@ -115,7 +126,7 @@ def error_time(scene, size=(96, 72), seconds=120.0, seed=0, technique="bvh", pro
     -------
     dict
         rows : list of dict, a setting each, with the keys `COLUMNS`, ``times`` and ``options``; floor : float, the
-        reference's own RMSE; reference : dict; left_out : list of str; words : list of str; stopped : bool.
+        reference's own RMSE; slopes : dict, curve -> slope of its error against samples, log-log; reference : dict; left_out : list of str; words : list of str; stopped : bool.
 
     Raises
     ------
@@ -131,6 +142,10 @@ def error_time(scene, size=(96, 72), seconds=120.0, seed=0, technique="bvh", pro
         )
     sweep = _Sweep(scene, size, seconds, seed, technique, progress, say)
     return sweep.run()
+
+
+def _shadow_rays(n):
+    return f"{n} shadow ray{'s' * (n > 1)}"
 
 
 class _TooLong(Exception):
@@ -150,6 +165,8 @@ class _Sweep:
             say,
         )
         self.scenes, self.indices = {0: scene}, {(0, ""): build(scene, technique)}
+        #: The picture that techniques of the same samples are compared with.
+        self.same = None
         self.began = time.perf_counter()
         self.done, self.total = 0.0, 1.0
         self.full = self._deep_enough()
@@ -178,17 +195,19 @@ class _Sweep:
                 self.progress(1.0)
         except Cancelled:
             stopped = True
-        missing = [s for s in settings if not s.times]
+        missing = {}
+        for s in settings:
+            if not s.times:
+                why = s.why or ("stopped before." if stopped else "no time was left.")
+                missing.setdefault((s.curve, why), []).append(s.label)
+        left_out += [f"{curve}: {', '.join(labels)}: {why}" for (curve, why), labels in missing.items()]
         settings = [s for s in settings if s.times]
-        for s in missing:
-            why = "stopped before" if stopped else "no time was left"
-            if s.given_up:
-                why = f"given up after {s.given_up:.3g} s; give more --seconds, or a smaller --size"
-            left_out.append(f"{s.curve}, {s.label}: {why}.")
-        words = _judged(settings, floor)
+        slopes = _slopes(settings, floor)
+        words = _judged(settings, floor) + _converged(slopes) + _alike(settings)
         return {
             "rows": [s.row() for s in settings],
             "floor": floor,
+            "slopes": slopes,
             "reference": {
                 "samples": FINER * finest,
                 "options": self.full,
@@ -232,6 +251,13 @@ class _Sweep:
             if self.progress:
                 self.progress(min(1.0, (self.done + fraction * work) / self.total))
 
+        if (scene, technique) not in self.indices:
+            try:
+                self.indices[scene, technique] = build(self.scenes[scene], technique, progress=progress)
+            except Cancelled:
+                if late():
+                    raise _TooLong from None
+                raise
         result = trace(
             self.scenes[scene],
             index=self.indices[scene, technique],
@@ -255,7 +281,8 @@ class _Sweep:
             settings.extend(Setting(name, label, knob, {**self.full, **base, **options}) for label, options in points)
 
         doubling = [2**k for k in range(int(math.log2(finest)) + 1)]
-        curve("antialiasing", "samples", [(f"{n} samples", {"samples": n}) for n in doubling if n > 1])
+        for name, how in (("samples", {}), ("random samples", {"sampling": "random"})):
+            curve("antialiasing", name, [(f"{n} samples", {"samples": n, **how}) for n in doubling if n > 1])
         levels = int(math.log(finest, 4) + 1e-9)
         if levels >= 1:
             for way in ("corners", "variance"):
@@ -293,15 +320,30 @@ class _Sweep:
             curve(
                 "shadows",
                 f"shadow rays to each light, {few} samples",
-                [(f"{n} shadow rays", {"light_samples": n}) for n in (1, 2, 4, 8) if n * few <= 2 * finest],
+                [(_shadow_rays(n), {"light_samples": n}) for n in (1, 2, 4, 8) if n * few <= 2 * finest],
                 samples=few,
             )
         else:
             left_out.append("shadow rays to each light: no light of the scene has an extent.")
         self._tessellations(settings, left_out, finest)
-        left_out.append("float32 against float64: the tracer computes in float64 alone.")
+        self._techniques(settings, left_out, some)
         self._whole_pixels(settings, left_out)
         return settings, left_out
+
+    def _techniques(self, settings, left_out, some):
+        """Settings of techniques that trace the same samples: exact ones, and those that find triangles in float32."""
+        others = [name for name in TECHNIQUES if name != self.technique]
+        for name in FLOAT32:
+            try:
+                self.indices[0, name] = build(self.scenes[0], name)
+                others.append(name)
+            except RayscopeError as error:
+                left_out.append(f"float32 against float64, {name}: {error}")
+        for name in ("", *others):
+            label = f"{name or self.technique}{' (float32)' if name in FLOAT32 else ''}"
+            options = {**self.full, "samples": some}
+            curve = f"techniques, the same {some} samples"
+            settings.append(Setting(curve, label, "techniques", options, technique=name, same=True))
 
     def _whole_pixels(self, settings, left_out):
         """Settings of techniques that trace pixels as a whole, against the samples of all others."""
@@ -310,7 +352,7 @@ class _Sweep:
         soft = any(light.has_extent and any(light.colour) for light in scene.lights)
         alone = [("as it is", {})]
         least = [(f"threshold {t:g}", {"threshold": t}) for t in (0.1, 0.03, 0.01)] if mirrors else alone
-        rays = [(f"{n} shadow rays", {"light_samples": n}) for n in (1, 4, 16)] if soft else alone
+        rays = [(_shadow_rays(n), {"light_samples": n}) for n in (1, 4, 16)] if soft else alone
         # Rays do not scatter: neither shall cones.
         for name, parameters, points in (("cones", {"gloss": False}, least), ("pyramids", {}, rays), ("beams", {}, rays)):
             index = build(scene, name, **parameters)
@@ -365,7 +407,8 @@ class _Sweep:
                 left = self.seconds - (time.perf_counter() - self.began)
                 # A few points there are in any case. The first timed run belongs to the point, more are made in time.
                 if turn == 0:
-                    skip = left < 0.0 and place >= FEWEST_POINTS
+                    # What was counted is also timed once.
+                    skip = left < sum(spent.values()) and place >= FEWEST_POINTS
                 else:
                     skip = i not in spent or (turn > 1 and spent[i] > left)
                 if skip:
@@ -384,14 +427,20 @@ class _Sweep:
                         max(OVERTIME * cost * work[i], 0.25 * self.seconds, 1.0),
                     )
                 except _TooLong:
-                    setting.given_up = time.perf_counter() - start
+                    seconds = time.perf_counter() - start
+                    setting.why = f"given up after {seconds:.3g} s; give more --seconds, or a smaller --size."
+                    continue
+                except MemoryEstimateError as error:
+                    setting.why = str(error)
                     continue
                 spent[i] = time.perf_counter() - start
                 if turn == 0:
                     kinds = [f for f in result.figures.values() if isinstance(f, dict)]
                     setting.rays = sum(f["rays"] for f in kinds)
                     setting.tests = round(sum(f["N_IT"] * f["rays"] for f in kinds))
-                    setting.error = errors(result.image, reference)
+                    if setting.same and self.same is None:
+                        self.same = result.image
+                    setting.error = errors(result.image, self.same if setting.same else reference)
                 else:
                     setting.times.append(result.figures["T_R"])
             self.say(
@@ -399,22 +448,25 @@ class _Sweep:
             )
 
 
+def _quicker(a, b):
+    """Whether setting a takes less time than b for sure; timed only once, it must also have had less to do."""
+    often = min(len(a.times), len(b.times)) > 1
+    return max(a.times) < min(b.times) and (often or (a.rays < b.rays and a.tests < b.tests))
+
+
 def _judged(settings, floor):
     """Mark settings that are never worth it, and say in words what came out."""
     words = []
     for s in settings:
-        better = [
-            o
-            for o in settings
-            if o.knob == s.knob and max(o.times) < min(s.times) and o.error["rmse"] < s.error["rmse"]
-        ]
+        better = [o for o in settings if o.knob == s.knob and o.error["rmse"] <= s.error["rmse"] and _quicker(o, s)]
         if better:
             best = min(better, key=lambda o: o.error["rmse"])
             s.verdict = f"dominated by {best.curve}: {best.label}"
-    if not settings:
+    sampled = [s for s in settings if not s.same]
+    if not sampled:
         return ["Nothing was measured: there was no time."]
-    enough = [s for s in settings if s.error["rmse"] <= STEP]
-    best = min(settings, key=lambda s: s.error["rmse"])
+    enough = [s for s in sampled if s.error["rmse"] <= STEP]
+    best = min(sampled, key=lambda s: s.error["rmse"])
     if floor > STEP:
         words.append(
             f"The reference's own error, {floor:.2g}, is above 1/255 = {STEP:.2g}: what reaches 1/255 cannot be told. "
@@ -442,11 +494,56 @@ def _judged(settings, floor):
             never.setdefault(s.curve, []).append(s.label)
     if never:
         words.append(
-            "Never worth it, because another setting of the same knob is both faster and more exact: "
+            "Never worth it, because another setting of the same knob is both faster and no less exact: "
             + "; ".join(f"{curve}: {', '.join(labels)}" for curve, labels in never.items())
             + "."
         )
     return words
+
+
+def _slopes(settings, floor):
+    """Curve -> slope of its error against samples, log-log, where three points stand out from the reference's own."""
+    slopes = {}
+    for curve in ("samples", "random samples"):
+        points = [
+            (s.options["samples"], s.error["rmse"])
+            for s in settings
+            if s.curve == curve and s.error["rmse"] > 2.0 * floor
+        ]
+        if len(points) >= 3:
+            n, rmse = np.array(points).T
+            slopes[curve] = float(np.polyfit(np.log(n), 0.5 * np.log(rmse**2 - floor**2), 1)[0])
+    return slopes
+
+
+def _converged(slopes):
+    """In words whether random samples do what they must."""
+    slope = slopes.get("random samples")
+    if slope is None:
+        return []
+    if abs(slope / SLOPE - 1.0) <= SLACK:
+        end = f": {SLOPE:g} within {SLACK:.0%}, as it must be"
+    else:
+        end = (
+            f", which is not {SLOPE:g} within {SLACK:.0%}: there are few settings, or few and rare bright samples, "
+            "of which a display shows no more than white"
+        )
+    stratified = f" Stratified samples: {slopes['samples']:.2f}." if "samples" in slopes else ""
+    return [f"With random samples the error falls as samples^{slope:.2f}{end}.{stratified}"]
+
+
+def _alike(settings):
+    """In words what other techniques made of the same samples."""
+    same = [s for s in settings if s.same]
+    if len(same) < 2:
+        return []
+    first, others = same[0], same[1:]
+    told = []
+    for s in others:
+        error = s.error["rmse"]
+        times = f"{min(s.times) / min(first.times):.2g} x the time of {first.label}"
+        told.append(f"{s.label}: {'the same picture' if error == 0 else f'error {error:.2g}'}, {times}")
+    return [f"Other techniques, with {first.curve.split(', ')[1]}: {'; '.join(told)}."]
 
 
 #: Plot -> (figure along x, its title, measure along y).
@@ -465,25 +562,39 @@ def plot(path, result, name, title):
     if not rows:
         return False
     figure = report.figure_class()(figsize=(10, 6), layout="constrained")
-    axes = figure.add_subplot(xlabel=x_title, ylabel=MEASURES[y], title=title, xscale="log", yscale="log")
-    positive = [r[y] for r in rows if r[y] > 0]
-    foot = 0.5 * min(positive, default=1e-6)
+    from matplotlib.ticker import LogLocator
+
+    axes = figure.add_subplot(xlabel=x_title, ylabel=f"{y}: {MEASURES[y]}", title=title, xscale="log", yscale="log")
+    # At the foot stands what has no error.
+    foot = 0.5 * min([r[y] for r in rows if r[y] > 0] + [result["floor"] or math.inf], default=1e-6)
     for i, curve in enumerate(dict.fromkeys(r["curve"] for r in rows)):
         points = sorted((r for r in rows if r["curve"] == curve), key=lambda r: r[x])
         xs, ys = [r[x] for r in points], [r[y] or foot for r in points]
-        axes.plot(xs, ys, marker="osD^v<>pPX*h"[i % 12], color=f"C{i % 10}", linewidth=1, markersize=6, label=curve)
+        alike = points[0]["against"] != "reference"
+        line = "none" if alike else "-" if i < 10 else "--"
+        axes.plot(xs, ys, line, marker="osD^v<>pPX*h"[i % 12], color=f"C{i % 10}", linewidth=1, label=curve)
         if x == "T":
             axes.hlines(ys, xs, [r["T_worst"] for r in points], color=f"C{i % 10}", alpha=0.4)
-        for r, py in zip(points, ys):
-            if r[y] == 0:
-                axes.annotate("error 0", (r[x], py), fontsize=7, xytext=(4, 4), textcoords="offset points")
+        if alike:
+            axes.axhline(foot, color=f"C{i % 10}", linewidth=0.5, label="no error")
+            places = {}
+            for r, py in zip(points, ys):  # those that stand close together share a label
+                place = next((p for p in places if p[1] == py and r[x] < 1.1 * p[0]), (r[x], py))
+                places.setdefault(place, []).append(r["setting"])
+            for place, names in places.items():
+                axes.annotate("\n".join(names), place, fontsize=7, xytext=(0, 6), textcoords="offset points")
+        elif curve == "random samples" and x == "rays":
+            line = [ys[0] * (v / xs[0]) ** SLOPE for v in xs]
+            axes.plot(xs, line, color="0.3", linestyle="-.", linewidth=1, label=f"slope {SLOPE:g}")
     if y == "rmse":
         if result["floor"] > 0:
             axes.axhline(result["floor"], color="0.5", linestyle="--", label="the reference's own error")
         axes.axhline(STEP, color="0.5", linestyle=":", label="1/255")
     axes.grid(True, which="both", alpha=0.25)
-    axes.tick_params(axis="both", which="minor", labelsize=6)
-    axes.tick_params(axis="x", which="minor", rotation=60)
+    for axis in (axes.xaxis, axes.yaxis):
+        axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+        axis.set_major_formatter(lambda value, place: f"{value:g}")
+        axis.set_minor_formatter(lambda value, place: "")
     figure.legend(loc="outside right upper", frameon=False, fontsize=8)
     figure.savefig(path, dpi=110)
     return True

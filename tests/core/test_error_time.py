@@ -97,15 +97,25 @@ def test_tessellations_come_closer_to_the_solids():
     assert rmse[0] > 2 * rmse[1] > 4 * rmse[2]
 
 
+def whole(scene, size, finest, **more):
+    """A sweep up to so many samples, however busy the machine is."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(lab, "MOST", finest)
+        patch.setattr(lab, "REPEATS", 2)
+        return lab.error_time(scene, size, seconds=600, **more)
+
+
 @pytest.fixture(scope="module")
 def swept():
-    return lab.error_time(room(), (16, 12), seconds=12, seed=3)
+    return whole(room(), (16, 12), 16, seed=3)
 
 
 def test_every_knob_the_scene_has_something_for_is_swept(swept):
     curves = {r["curve"].split(",")[0] for r in swept["rows"]}
     assert curves == {
         "samples",
+        "random samples",
+        "techniques",
         "corners",
         "variance",
         "maximum depth",
@@ -117,13 +127,19 @@ def test_every_knob_the_scene_has_something_for_is_swept(swept):
         "pyramids in place of samples",
         "beams in place of samples",
     }
-    assert {r["options"].get("technique") for r in swept["rows"]} == {None, "cones", "pyramids", "beams"}
+    ways = {None, "cones", "pyramids", "beams"}
+    assert {r["options"].get("technique") for r in swept["rows"]} == ways | set(lab.TECHNIQUES)
     assert any(line.startswith("beams: ") and "sphere" in line and "sampled" in line for line in swept["left_out"])
     for row in swept["rows"]:
         assert set(lab.COLUMNS) <= set(row)
         assert 0 < row["T"] <= row["T_worst"] and len(row["times"]) == row["runs"] >= 1
         assert row["rays"] > 16 * 12 and row["tests"] > 0
-        assert 0 < row["rmse"] <= row["maximum"] <= 1 and 0 <= row["share"] <= 1 and 0 < row["flip"] < 1
+        if row["against"] == "reference":
+            assert 0 < row["rmse"] <= row["maximum"] <= 1 and 0 <= row["share"] <= 1 and 0 < row["flip"] < 1
+        else:  # exact techniques, with the samples of the bvh
+            assert row["curve"].startswith("techniques, the same") and row["rmse"] == row["maximum"] == row["flip"] == 0
+    for peer in lab.FLOAT32:  # they take triangles only, and are not everywhere
+        assert any(line.startswith(f"float32 against float64, {peer}:") for line in swept["left_out"])
     uniform = [r for r in swept["rows"] if r["curve"] == "samples"]
     assert [r["rays"] for r in uniform] == sorted(r["rays"] for r in uniform)
     assert uniform[-1]["rmse"] < uniform[0]["rmse"]
@@ -134,7 +150,7 @@ def test_every_knob_the_scene_has_something_for_is_swept(swept):
 
 
 def test_what_it_says_follows_from_its_rows(swept):
-    rows, words = swept["rows"], " ".join(swept["words"])
+    rows, words = [r for r in swept["rows"] if r["against"] == "reference"], " ".join(swept["words"])
     enough = [r for r in rows if r["rmse"] <= STEP]
     if swept["floor"] > STEP:
         assert "cannot be told" in words
@@ -144,16 +160,19 @@ def test_what_it_says_follows_from_its_rows(swept):
     else:
         assert "No setting reached" in words
     for row in rows:
-        better = [o for o in rows if o["T_worst"] < row["T"] and o["rmse"] < row["rmse"]]
+        better = [o for o in rows if o["T_worst"] < row["T"] and o["rmse"] <= row["rmse"]]
         assert not row["verdict"] or better
+    assert "octree: the same picture, " in words
 
 
 def test_knobs_without_an_object_are_left_out_and_named():
     result = lab.error_time(room(mirror=False, soft=False, ball=False), (8, 6), seconds=3)
     assert {r["curve"].split(",")[0] for r in result["rows"]} <= {
         "samples",
+        "random samples",
         "corners",
         "variance",
+        "techniques",
         "cones in place of samples",
         "pyramids in place of samples",
         "beams in place of samples",
@@ -177,21 +196,52 @@ def test_cones_and_pyramids_where_nothing_fits_are_left_out():
 
 
 def test_dominated_settings():
-    def setting(label, knob, seconds, rmse):
-        return lab.Setting("curve", label, knob, {}, times=seconds, error={"rmse": rmse})
+    def setting(label, knob, seconds, rmse, rays=100):
+        return lab.Setting("curve", label, knob, {}, times=seconds, rays=rays, tests=rays, error={"rmse": rmse})
 
     good = setting("good", "a", [1.0, 1.2], 0.001)
     slow = setting("slow", "a", [1.3, 2.0], 0.002)
+    same = setting("no better", "a", [1.3, 2.0], 0.001)
     noisy = setting("overlapping times", "a", [1.1, 1.4], 0.002)
     fast = setting("cheap", "a", [0.5], 0.01)
+    once = setting("timed once", "a", [1.3], 0.002)
+    more = setting("timed once, more rays", "a", [1.3], 0.002, rays=101)
     other = setting("another knob", "b", [9.0], 0.1)
-    words = lab._judged([good, slow, noisy, fast, other], floor=1e-4)
-    assert slow.verdict == "dominated by curve: good"
-    assert not (good.verdict or noisy.verdict or fast.verdict or other.verdict)
+    settings = [good, slow, same, noisy, fast, once, more, other]
+    words = lab._judged(settings, floor=1e-4)
+    assert [s for s in settings if s.verdict == "dominated by curve: good"] == [slow, same, more]
+    assert not any(s.verdict for s in (good, noisy, fast, once, other))
     assert "cheapest setting is curve: good" in words[0]
     assert "slow" in words[-1] and "cheap" not in words[-1]
     assert "cannot be told" in lab._judged([good], floor=0.1)[0]
     assert "No setting reached" in lab._judged([fast], floor=1e-4)[0]
+
+
+def test_slopes():
+    """Errors that fall as n^-1/2 above the reference's own; those that hardly stand out from it do not count."""
+
+    def settings(curve, power, counts):
+        return [
+            lab.Setting(curve, "", "", {"samples": n}, times=[1.0], error={"rmse": math.hypot(0.1 * n**power, 0.01)})
+            for n in counts
+        ]
+
+    swept = settings("random samples", -0.5, (2, 4, 8, 512)) + settings("samples", -0.75, (2, 4))
+    assert lab._slopes(swept, 0.01) == {"random samples": pytest.approx(-0.5)}
+    assert "as it must be" in lab._converged({"random samples": -0.44, "samples": -0.7})[0]
+    assert "is not -0.5 within 15%" in lab._converged({"random samples": -0.41})[0]
+    assert lab._converged({}) == []
+
+
+def test_float32_is_an_error_of_its_own():
+    """Triangles alone: a peer names them in float32; its picture is compared with the same samples in float64."""
+    pytest.importorskip("embreex")
+    scene = room(ball=False)
+    result = whole(scene, (8, 6), 4)
+    rows = {r["setting"]: r for r in result["rows"] if r["against"] == "same samples"}
+    assert rows["bvh"]["rmse"] == rows["kd-tree"]["rmse"] == 0
+    assert 0 <= rows["embree (float32)"]["rmse"] < 1e-3 < min(r["rmse"] for r in result["rows"] if r["curve"] == "samples")
+    assert any("embree (float32): " in line and "x the time of bvh" in line for line in result["words"])
 
 
 def test_too_little_time_gives_fewer_points_and_none_that_are_wrong():
@@ -202,7 +252,9 @@ def test_too_little_time_gives_fewer_points_and_none_that_are_wrong():
         assert row["T"] > 0 and row["rmse"] > 0
 
 
-def test_stopping():
+def test_stopping(monkeypatch):
+    monkeypatch.setattr("rayscope.core.rendering.INTERVAL", 0.0)         # the pictures may take less time than that
+
     def after(limit):
         def progress(fraction):
             if fraction > limit:
