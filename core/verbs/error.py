@@ -1,5 +1,7 @@
 """Error against run time."""
 
+from pathlib import Path
+
 from ..arguments import picture_size, whole
 from ..lab import error_time, report
 from ..outcome import DONE, FAILED, Outcome, say, stoppable
@@ -22,7 +24,8 @@ def run(call):
     record = report.record("error", scene, call.seed, {"size": call.size, "seconds": call.seconds}, **result)
     files = []
     if call.out:
-        files, note = error_time.write(result, call.out, f"{scene.name}, {call.size[0]} x {call.size[1]} pixels")
+        name = scene.name if call.in_blender else Path(call.file).stem
+        files, note = error_time.write(result, call.out, f"{name}, {call.size[0]} x {call.size[1]} pixels")
         files = [*files, report.save(record, call.out)]
         if note:
             say(note)
