@@ -21,6 +21,8 @@ SURE = 2.0**-50
 NEAR = 2.0**-16
 #: What a sum of products in two parts may be off by, relative to the sum of their sizes; and what t may be, to be rounded once.
 LOST, EXACT = 2.0**-97, 2.0**-62
+#: What the components of a normal of edges of about 1 may be off by, in LOST.
+LEFT = 2.0**-4
 
 
 class Asked:
@@ -123,13 +125,14 @@ def _double(o, d, rows, t):
         cross, rest = times(one, (two[0][::-1], two[1][::-1]))          # e1 f2 and f1 e2
         normal = plus((cross[0], rest[0]), (-cross[1], -rest[1]))
         off = plus(difference(o, rows[:3]), product(d, t))
-        whole, rest = times(normal, (np.stack((off[0], d)), np.stack((off[1], np.zeros_like(d)))))
+        ways = np.stack((off[0], d))
+        whole, rest = times(normal, (ways, np.stack((off[1], np.zeros_like(d)))))
         x, y, z = ((whole[:, k], rest[:, k]) for k in range(3))
         (height, slope), rest = plus(plus(x, y), z)
         off = (height + rest[0]) / (slope + rest[1])
         found, size, steep = t - off, np.abs(t), np.abs(slope)
-        # Both sums may cancel. And what is left of the last must tell to which side to round.
-        lost = LOST * np.abs(whole).sum(axis=1)
+        # Both sums may cancel, and those of the normal of a narrow triangle. And what is left of the last must tell to which side to round.
+        lost = LOST * np.maximum(np.abs(whole), LEFT * np.abs(ways)).sum(axis=1)
         left, step = np.abs((t - found) - off), np.spacing(np.abs(found))
         sure = (np.abs(off) < NEAR * size) & (steep > SURE * np.abs(d).max(axis=0))
         sure &= (lost[0] <= EXACT * size * steep) & (lost[1] <= EXACT / NEAR * steep)
