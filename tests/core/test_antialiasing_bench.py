@@ -55,7 +55,7 @@ def test_the_reference_knows_its_own_error():
 def test_the_command(monkeypatch, capsys):
     from rayscope.core.verbs import bench
 
-    monkeypatch.setattr(bench, "_examples", lambda call, size: [room("interior")])
+    monkeypatch.setattr(bench, "_examples", lambda call, size, names: [room("interior")] * (names == "interior.blend"))
     monkeypatch.setattr(antialiasing, "THRESHOLDS", (1e-6,))
     monkeypatch.setattr(antialiasing, "BAR", math.inf)
     assert main(["bench", "--adaptive", "--size", "8x6", "--repeats", "1", "--json"]) == 0
