@@ -12,10 +12,11 @@ from ..scene.spd import DATABASES, spd
 from .needs.calibrated import calibration
 from .needs.ground import lit, triangles
 
-#: A fixed choice that would take so many times as long as the best is not traced at the full size.
-HOPELESS = 1.5
+#: A fixed choice is traced at half the size first. What would take so many times as long as the best at the full size is given
+#: up, and so is what takes such a part of the best one's whole time to build besides what STANDARD takes.
+HOPELESS, BUILD = 1.5, 0.5
 #: So many of the others take part in the turns: the best of one run need not be the best.
-CLOSE = 2
+CLOSE = 1
 #: Turns are taken until all took so long together, but not more often than MOST; if they take LONG, twice only. Seconds.
 QUICK, MOST, LONG = 3.0, 12, 30.0
 #: What the automatic choice may take more than the best fixed one, and than STANDARD.
@@ -48,11 +49,11 @@ def against_fixed(scene, size=(240, 180), core="fast", choices=None, repeats=3):
     fixed = {_label(choice): choice for choice in ({}, *(_choices(core) if choices is None else choices))}
     for choice in fixed.values():                                       # importing is not tracing
         _traced(lit(triangles(20)), choice, core, (4, 4))
-    half, guessed, least = tuple(max(1, side // 2) for side in size), {}, math.inf
+    half, guessed, least, standard = tuple(max(1, side // 2) for side in size), {}, math.inf, 0.0
     for label, choice in fixed.items():
-        build, rays, _ = _traced(scene, choice, core, half, lambda b, r: b + 4.0 * r > HOPELESS * least)
+        build, rays, _ = _traced(scene, choice, core, half, lambda b, r: b > standard + BUILD * least or b + 4.0 * r > HOPELESS * least)
         guessed[label] = build + 4.0 * rays
-        least = min(least, guessed[label])
+        least, standard = min(least, guessed[label]), standard or build
     close = sorted((label for label in fixed if guessed[label] <= HOPELESS * least), key=guessed.get)[:1 + CLOSE]
     # In turns: a busy moment hits all alike, and ratios stay as they are.
     names, chosen, rounds, began = dict.fromkeys((AUTOMATIC, *close, STANDARD)), {}, [], time.process_time()

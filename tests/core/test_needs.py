@@ -373,11 +373,31 @@ def test_a_plain_scene_loads_nothing_else(core, loaded):
     ("Scene([Object('mesh', mesh, materials=(Material(transmission=1.0),))], camera=camera)", "tracing.optics"),
     ("Scene([Object('mesh', mesh)], [Light('lamp', 'point', (1, 1, 1), (3, 3, 3))], camera=camera)", "tracing.lights"),
     ("Scene([Object('ball', Shapes([solids.sphere((0, 0, 0), 1.0)]))], camera=camera)", "primitives.sphere"),
+    ("Scene([Object('one', mesh), Object('two', mesh)], camera=camera)", "primitives.instance"),
     ("Scene([Object('cut', Shapes([solids.difference(solids.box((0, 0, 0), (1, 1, 1)), solids.sphere((0, 0, 0), 0.5))]))], camera=camera)", "primitives.csg"),
-], ids=["mirror", "glass", "lamp", "sphere", "Boolean"])
+], ids=["mirror", "glass", "lamp", "sphere", "instance", "Boolean"])
 def test_what_is_needed_is_loaded(core, code, module, loaded):
     """The other half: the modules whose absence is tested above are those that do the work."""
-    assert f"{core}.{module}" in loaded(f"trace({code}, core='{core}', size=(16, 16))")
+    few = "from rayscope.core.scene import layout\nlayout.COPIES_AT_MOST = 5\n"     # so that the two are instances
+    assert f"{core}.{module}" in loaded(f"{few}trace({code}, core='{core}', size=(16, 16))")
+
+
+@pytest.mark.parametrize("core", ["fast", "pure"])
+def test_each_is_left_out_by_itself(core, loaded):
+    """Two scenes that have everything but what the other one has."""
+    mirror = "Object('mesh', mesh, materials=(Material(mirror=0.5),))"
+    ball = "Object('ball', Shapes([solids.sphere((0, 0, 0), 1.0)]))"
+    cut = "Object('cut', Shapes([solids.difference(solids.box((0, 0, 0), (1, 1, 1)), solids.sphere((0, 0, 0), 0.5))]))"
+    lamp = "[Light('lamp', 'point', (1, 1, 1), (3, 3, 3))]"
+    code = "r = trace(Scene([{}], {}, camera), core='{}', size=(8, 8))\nassert set(r.structures) == {!r}"
+    parts = {"tracing.secondary": True, "tracing.lights": False, "primitives.sphere": False, "primitives.csg": False}
+    first = loaded(code.format(mirror, "[]", core, {"primary", "secondary"}))
+    second = loaded(code.format(f"{ball}, {cut}", lamp, core, {"primary", "shadow"}))
+    for part, in_first in parts.items():
+        assert (f"{core}.{part}" in first) is in_first and (f"{core}.{part}" in second) is not in_first
+    balls = loaded(code.format(ball, "[]", core, {"primary"}))
+    assert f"{core}.primitives.sphere" in balls and f"{core}.primitives.csg" not in balls and f"{core}.tracing.lights" not in balls
+    assert not {m for m in first | second | balls if m.endswith(("primitives.instance", "tracing.texture", "light_buffer", "image_directory"))}
 
 
 def test_import_is_quick(said):
