@@ -147,7 +147,8 @@ def truth_row(case, scene, batch, right, full):
     row = {"case": case.name, "technique": "brute", "core": "pure", "rays": 0, "bad": [], "sweep": case.sweep,
            "leaks": int(((right.primitive < 0) == (batch.must == "hit")).sum()) if batch.must else 0}
     if case.exact:
-        some = np.linspace(0, len(batch) - 1, min(len(batch), EXACT[full])).astype(int)
+        # At random: rays take turns in what they are aimed at.
+        some = np.sort(np.random.default_rng(len(batch)).permutation(len(batch))[:EXACT[full]])
         part = batch.take(some)
         picked = type(right)(**{f: np.asarray(getattr(right, f))[some] for f in
                                 ("t", "primitive", "object", "u", "v", "part", "normal", "point", "error")})
