@@ -21,7 +21,7 @@ SAMPLES, FINER = 16, 16
 PARTS = 2
 DEPTH, LEVEL = 5, 3
 THRESHOLDS = (0.03, 0.025, 0.02)
-#: The scenes that the bar is for: at no more error than the uniform samples' no more than this part of their time.
+#: The examples that the bar is for: at no more error than the uniform samples' no more than this part of their time.
 ASKED, BAR = ("still_life", "interior"), 0.5
 
 

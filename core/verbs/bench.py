@@ -28,10 +28,10 @@ def options(sub):
     sub.add_argument("--automatic", action="store_true",
                      help="instead: the automatic choice of techniques against each fixed one, on the "
                      "procedural databases and the examples")
-    sub.add_argument("--only", metavar="A,B", help="with --automatic: these scenes alone, by name; to go on with a table")
+    sub.add_argument("--only", metavar="A,B", help="with --automatic or --adaptive: these scenes alone, by name")
     sub.add_argument("--adaptive", action="store_true",
                      help="instead: error, rays and time of adaptive antialiasing against 16 uniform samples, "
-                     "on the examples")
+                     "on the examples still life and interior, or those of --only")
     sub.add_argument("--generalised", metavar="FILE", nargs="*",
                      help="instead: error and time of cones, pyramids and beams beside sampled rays, in a room of "
                      "polygons and these scenes; without FILE, in the interior among the examples")
@@ -63,8 +63,10 @@ def run(call):
 
 def _adaptive(call):
     size = call.size or (128, 96)
-    result = antialiasing.antialiasing(_examples(call, size), size, call.repeats, call.seed, say=say)
-    record = report.record("bench", None, call.seed, {"adaptive": True, "size": size, "repeats": call.repeats}, **result)
+    only = call.only.split(",") if call.only else antialiasing.ASKED
+    result = antialiasing.antialiasing(_examples(call, size, only=only), size, call.repeats, call.seed, say=say)
+    asked = {"adaptive": True, "size": size, "repeats": call.repeats, "only": only}
+    record = report.record("bench", None, call.seed, asked, **result)
     return Outcome(antialiasing.text(result), record, FAILED if result["missed"] else DONE)
 
 

@@ -55,12 +55,14 @@ def test_the_reference_knows_its_own_error():
 def test_the_command(monkeypatch, capsys):
     from rayscope.core.verbs import bench
 
-    monkeypatch.setattr(bench, "_examples", lambda call, size, names: [room("interior")] * (names == "interior.blend"))
+    monkeypatch.setattr(bench, "_examples", lambda call, size, only: [room(name) for name in only])
     monkeypatch.setattr(antialiasing, "THRESHOLDS", (1e-6,))
     monkeypatch.setattr(antialiasing, "BAR", math.inf)
-    assert main(["bench", "--adaptive", "--size", "8x6", "--repeats", "1", "--json"]) == 0
+    call = ["bench", "--adaptive", "--only", "interior", "--size", "8x6", "--repeats", "1"]
+    assert main([*call, "--json"]) == 0
     printed = json.loads(capsys.readouterr().out)
-    assert printed["parameters"] == {"adaptive": True, "size": [8, 6], "repeats": 1} and len(printed["rows"]) == 2
+    assert printed["parameters"] == {"adaptive": True, "size": [8, 6], "repeats": 1, "only": ["interior"]}
+    assert len(printed["rows"]) == 2
     monkeypatch.setattr(antialiasing, "BAR", 0.0)
-    assert main(["bench", "--adaptive", "--size", "8x6", "--repeats", "1"]) == 1
+    assert main(call) == 1
     assert "not met" in capsys.readouterr().out
