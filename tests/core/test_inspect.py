@@ -50,12 +50,13 @@ def test_everything_is_booked():
 
 
 def test_not_reached_duplicates_and_copies():
-    same = ball(8)
+    same = ball(24)
     moved = Mesh(same.vertices @ np.linalg.qr(np.random.default_rng(1).normal(size=(3, 3)))[0] + (2.5, 0, 0), same.triangles)
     scene = seen([placed("one", same), placed("doubled", same), placed("behind", ball(6, 3), (0, -30, 0)), Object("made real", moved)])
     result = inspecting.inspect(scene)
     assert {("duplicate", "doubled"), ("not reached", "behind"), ("copies", "one", "made real")} <= causes(result)
-    assert not {c for c in causes(result) if c[0] in ("not reached", "duplicate") and "made real" in c}
+    assert not {c for c in causes(result) if c[0] in ("not reached", "duplicate", "hidden") and "made real" in c}
+    assert not {c for c in causes(result) if c[0] == "hidden"}             # the double is one already
     doubled = next(f for f in result.findings if f.cause == "duplicate")
     assert 0.15 < doubled.gain < 0.8
     gains = [f.gain or 0.0 for f in result.findings]
@@ -85,12 +86,47 @@ def test_sub_pixel_tiny_and_overlapping():
     assert next(f for f in result.findings if f.cause == "tiny and detailed").gain > 0.2
     assert "Decimate" in next(f for f in result.findings if f.cause == "sub-pixel").remedy
     hidden = inspecting.inspect(seen([placed("outer", ball(8)), placed("inner", ball(8, 5), (0, 0, 0), 0.8)]))
-    overlap = [f for f in hidden.findings if f.cause == "overlap"]
-    assert overlap and overlap[0].gain > 0.05 and "inner" in overlap[0].remedy
+    found = [f for f in hidden.findings if f.cause in ("hidden", "overlap")]
+    assert [f.cause for f in found] == ["hidden"] and found[0].objects == ["inner"] and found[0].gain > 0.05 and "Disable" in found[0].remedy
+
+
+def test_what_is_seen_or_shades_is_not_hidden():
+    outer = placed("outer", ball(8), (0, 0, 0))
+    wire = Object("wire", Mesh([(-2, -3, 1.2), (2, -3, 1.2), (2, -3, 1.2002)], [(0, 1, 2)]))                      # between the rays
+    # Behind the camera, in front of the sun.
+    shade = Object("shade", Mesh([(-9, -20, 5), (9, -20, 5), (9, -20, 30), (-9, -20, 30)], [(0, 1, 2), (0, 2, 3)]))
+    scene = seen([outer, wire, shade])
+    scene.lights.append(Light("sun", "sun", (1.0, 1.0, 1.0), direction=(0.0, 0.8, -0.6)))
+    ledger, _ = measure(scene, size=(40, 30))
+    assert not ledger.hits[1] and ledger.blocks[2] > 0 and not ledger.hits[2]
+    assert not {c for c in causes(inspecting.inspect(scene)) if c[0] in ("hidden", "not reached")}
+    without_sun = seen([outer, wire, shade])
+    assert {c for c in causes(inspecting.inspect(without_sun)) if c[0] in ("hidden", "not reached")} == {("not reached", "shade")}
+
+
+def test_poles_askew_are_no_overlap_and_one_finding():
+    """Their boxes overlap, but that is because they lie askew."""
+    turn, _ = np.linalg.qr(np.random.default_rng(5).normal(size=(3, 3)))
+    angle = np.linspace(0.0, 2.0 * np.pi, 12, endpoint=False)
+    ring = np.stack([0.05 * np.cos(angle), 0.05 * np.sin(angle)], axis=1)
+    vertices = np.concatenate([np.column_stack([ring, np.full(12, z)]) for z in (-2.0, 2.0)]) @ turn.T
+    sides = [t for k in range(12) for t in ((k, (k + 1) % 12, 12 + k), ((k + 1) % 12, 12 + (k + 1) % 12, 12 + k))]
+    poles = [Object(f"pole {k}", Mesh(vertices + (0.4 * k - 1.0, 0.1 * k, 0.0), sides)) for k in range(6)]
+    result = inspecting.inspect(seen(poles))
+    assert "overlap" not in {f.cause for f in result.findings}
+    diagonal, = [f for f in result.findings if f.cause == "diagonal"]
+    assert sorted(diagonal.objects) == [f"pole {k}" for k in range(6)] and diagonal.gain > 0.2 and "so with 5 others" in diagonal.text
+
+
+def test_instances_at_one_place_are_duplicates(monkeypatch):
+    mesh = ball(8)
+    monkeypatch.setattr("rayscope.core.scene.layout.COPIES_AT_MOST", 10)
+    result = inspecting.inspect(seen([placed(name, mesh, (x, 0, 0)) for name, x in (("one", 0), ("twice", 0), ("other", 1.5))]))
+    assert ("duplicate", "twice") in causes(result) and not {c for c in causes(result) if "other" in c}
 
 
 def test_remedies_of_copies_and_of_overlaps():
-    same, turn = ball(8), np.linalg.qr(np.random.default_rng(1).normal(size=(3, 3)))[0]
+    same, turn = ball(16), np.linalg.qr(np.random.default_rng(1).normal(size=(3, 3)))[0]
     moved = Mesh(1.5 * same.vertices @ turn + (2.5, 0, 0), same.triangles)
     mirrored = Mesh(same.vertices * (-1.0, 1.0, 1.0) + (-2.5, 0, 0), same.triangles)
     scene = seen([placed("one", same), Object("moved", moved), Object("mirrored", mirrored)])
@@ -102,7 +138,7 @@ def test_remedies_of_copies_and_of_overlaps():
     assert copies and copies[0].gain == pytest.approx(0.0, abs=0.05)      # they save memory
     pair = seen([placed("left", ball(16, 1), (-0.35, 0, 0)), placed("right", ball(16, 2), (0.35, 0, 0))])
     corners = own_corners(pair)
-    joined = united(0, 1, corners)(pair)
+    joined = united([(0, 1)], corners)(pair)
     assert 0.5 < joined.n_primitives / pair.n_primitives < 0.9
     pictures = [trace(s, size=(24, 24)).passes["depth"] for s in (pair, joined)]
     assert (pictures[0] == pictures[1]).mean() > 0.98                   # what was inside is not missed

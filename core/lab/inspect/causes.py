@@ -2,47 +2,65 @@
 
 import itertools
 import zlib
+from dataclasses import replace
 
 import numpy as np
 
 from ...scene.layout import to_world
 from ...scene.scene import Mesh
 from .finding import Finding
-from .remedies import clustered, halved, linked, united, with_mesh, without
+from .remedies import chained, clustered, halved, linked, united, with_mesh, without
 from .shapes import area_of, box_of, shapes_of
 
 #: A triangle is a sliver when its longest side is so many times its height.
 SLIVER = 100.0
 #: Bytes that a triangle takes in mesh and structure, about.
 TRIANGLE_BYTES = 250
+#: Copies that take less are no finding: bytes.
+LEAST_MEMORY = 100_000
+#: More findings than this of one cause, which one remedy helps, become one.
+ALONE = 3
+#: An object whose own oriented box fills less of the box along the axes lies askew: boxes that overlap are not its fault.
+FILLED = 0.25
 
 
-def unreached(scene, ledger, **_):
-    """Objects that no ray came near enough to be tested against."""
-    for k, o in enumerate(scene.objects):
-        if len(o.geometry) and not ledger.tests[k]:
-            yield Finding([o.name], "not reached", f"none of {ledger.rays:,} rays was tested against it, but its {len(o.geometry):,} primitives are built in",
-                          "Disable it in renders (camera icon in the Outliner), or delete it.", len(o.geometry), memory=len(o.geometry) * TRIANGLE_BYTES,
-                          apply=without(k))
+def unreached(scene, ledger, corners, unseen, **_):
+    """Objects that no ray comes near, and objects that hide within others: tested against, but never met."""
+    again = {k for group in at_one_place(scene, corners) for k in group[1:]}       # hidden by what they are duplicates of
+    for k in (k for k in unseen if k not in again):
+        o = scene.objects[k]
+        many, remedy = len(o.geometry), "Disable it in renders (camera icon in the Outliner), or delete it."
+        if ledger.tests[k]:
+            yield Finding([o.name], "hidden", f"{ledger.tests[k]:,.0f} tests were made on it, but none of {ledger.rays:,} rays met it, nor one aimed at it: it hides in "
+                          "or behind others", remedy, float(ledger.tests[k]), memory=many * TRIANGLE_BYTES, same=True, apply=without(k))
+        else:
+            yield Finding([o.name], "not reached", f"none of {ledger.rays:,} rays was tested against it, but its {many:,} primitives are built in",
+                          remedy, many, memory=many * TRIANGLE_BYTES, same=True, apply=without(k))
 
 
 def duplicates(scene, ledger, corners, **_):
     """Objects that are the same triangles at the same place."""
+    for group in at_one_place(scene, corners):
+        names, many = [scene.objects[k].name for k in group], len(scene.objects[group[0]].geometry)
+        yield Finding(names[1:], "duplicate", f"{len(group)} objects are one and the same at the same place, {names[0]} among them",
+                      "Delete all but one: they were duplicated without being moved (Shift D, Esc).", len(group),
+                      memory=(len(group) - 1) * many * TRIANGLE_BYTES, apply=without(*group[1:]))
+
+
+def at_one_place(scene, corners):
+    """Numbers of objects that are one and the same at the same place, in groups; instances, too."""
     same = {}
-    for k, own in enumerate(corners):
+    for k, (o, own) in enumerate(zip(scene.objects, corners)):
         if len(own):
             same.setdefault((len(own), zlib.crc32(np.ascontiguousarray(own + 0.0).tobytes())), []).append(k)
-    for group in same.values():
-        if len(group) > 1:
-            names = [scene.objects[k].name for k in group]
-            yield Finding(names[1:], "duplicate", f"{len(group)} objects are one and the same at the same place, {names[0]} among them",
-                          "Delete all but one: they were duplicated without being moved (Shift D, Esc).", len(group),
-                          memory=(len(group) - 1) * len(corners[group[0]]) * TRIANGLE_BYTES, apply=without(*group[1:]))
+        elif len(o.geometry):
+            same.setdefault((id(o.geometry), np.ascontiguousarray(o.matrix + 0.0).tobytes()), []).append(k)
+    return [group for group in same.values() if len(group) > 1]
 
 
 def made_real(scene, ledger, corners, **_):
-    """Meshes that are copies of one another."""
-    alike, known = {}, set()
+    """Meshes that are copies of one another; those at the same place are duplicates."""
+    alike, known, places = {}, set(), set()
     for k, o in enumerate(scene.objects):
         mesh = o.geometry
         if not isinstance(mesh, Mesh) or len(mesh) < 12 or id(mesh) in known:
@@ -53,10 +71,13 @@ def made_real(scene, ledger, corners, **_):
         if not np.isfinite(world).all():
             continue
         lengths = np.linalg.norm(np.diff(world, axis=0), axis=1)
+        if (place := zlib.crc32(np.ascontiguousarray(world + 0.0).tobytes())) in places:
+            continue
+        places.add(place)
         digest = zlib.crc32(np.round(lengths / (lengths.max() or 1.0), 4).astype(np.float32).tobytes(), zlib.crc32(mesh.triangles.tobytes()))
         alike.setdefault((len(mesh), digest), {}).setdefault(id(mesh), []).append(k)
     for (triangles, _), meshes in alike.items():
-        if len(meshes) > 1:
+        if len(meshes) > 1 and (len(meshes) - 1) * triangles * TRIANGLE_BYTES > LEAST_MEMORY:
             names = [scene.objects[some[0]].name for some in meshes.values()]
             yield Finding(names, "copies", f"{len(meshes)} meshes of {triangles:,} triangles are the same shape, stored {len(meshes)} times",
                           "Select them, the original last, and link their data: Object > Link/Transfer Data > Link Object Data.", len(meshes),
@@ -137,26 +158,61 @@ def teapot_in_a_stadium(scene, ledger, corners, technique, total, **_):
                           apply=lambda scene: (scene, "bvh"))
 
 
-def overlapping(scene, ledger, corners, total, **_):
-    """Objects whose boxes overlap widely, both costly: every ray there is tested against both."""
-    costly = [k for k in np.argsort(-ledger.tests)[:24] if len(corners[k]) and ledger.tests[k] > 0.03 * total]
+def overlapping(scene, ledger, corners, total, unseen, **_):
+    """Objects whose boxes overlap widely, all costly: every ray there is tested against each."""
+    costly = [int(k) for k in np.argsort(-ledger.tests)[:24] if len(corners[k]) and ledger.tests[k] > 0.03 * total and k not in unseen]
+    costly = [k for k in costly if _filled(corners[k]) > FILLED]
+    pairs, shares = [], {}
     for a, b in itertools.combinations(costly, 2):
         (alo, ahi), (blo, bhi) = box_of(corners[a]), box_of(corners[b])
         common = np.minimum(ahi, bhi) - np.maximum(alo, blo)
         smaller, larger = sorted((np.ptp([alo, ahi], axis=0).prod(), np.ptp([blo, bhi], axis=0).prod()))
-        # A room around a table is no overlap that could be helped.
-        if (common <= 0.0).any() or smaller <= 0.1 * larger or common.prod() < 0.5 * smaller:
+        # A room around a table is no overlap that could be helped; one and the same is a duplicate.
+        if (common <= 0.0).any() or smaller <= 0.1 * larger or common.prod() < 0.5 * smaller or np.array_equal(corners[a], corners[b]):
             continue
-        wasted = [1.0 - ledger.hits[k] / max(ledger.tests[k], 1) for k in (a, b)]
-        if max(wasted) < 0.5:
-            continue
-        inner = a if np.ptp([alo, ahi], axis=0).prod() <= np.ptp([blo, bhi], axis=0).prod() else b
-        hidden = ledger.hits[inner] == 0
-        yield Finding([scene.objects[a].name, scene.objects[b].name], "overlap", f"their boxes share {common.prod() / smaller:.0%} of the smaller one; {wasted[0]:.0%} and "
-                      f"{wasted[1]:.0%} of the tests on them hit something else or nothing" + (f"; {scene.objects[inner].name} is never seen" if hidden else ""),
-                      "Move them apart, or delete the faces that lie inside the other (Boolean modifier, Union)." if not hidden else
-                      f"Disable {scene.objects[inner].name} in renders: it lies hidden inside the other.", float(common.prod() / smaller),
-                      apply=without(int(inner)) if hidden else united(int(a), int(b), corners))
+        if max(1.0 - ledger.hits[k] / max(ledger.tests[k], 1) for k in (a, b)) >= 0.5:
+            pairs.append((a, b))
+            shares[a, b] = float(common.prod() / smaller)
+    for some in _connected(pairs):
+        objects = sorted({k for pair in some for k in pair}, key=lambda k: -ledger.tests[k])
+        wasted = 1.0 - sum(ledger.hits[k] for k in objects) / sum(ledger.tests[k] for k in objects)
+        share = max(shares[pair] for pair in some)
+        yield Finding([scene.objects[k].name for k in objects], "overlap", f"their boxes share {share:.0%} of the smaller one; {wasted:.0%} of the tests on them hit something "
+                      "else or nothing", "Move them apart, or delete the faces that lie inside the other (Boolean modifier, Union).", share, apply=united(some, corners))
 
 
+def _filled(corners):
+    """Volume of a box along the object's own axes, by that along the axes of the world."""
+    points = corners.reshape(-1, 3)
+    axes = np.linalg.svd(points - points.mean(axis=0), full_matrices=False)[2] if len(points) > 3 else np.eye(3)
+    whole = np.ptp(points, axis=0).prod()
+    return float(np.ptp(points @ axes.T, axis=0).prod() / whole) if whole > 0.0 else 1.0
+
+
+def _connected(pairs):
+    """Pairs that have objects in common, together."""
+    groups = []
+    for pair in pairs:
+        near = [g for g in groups if any(set(pair) & set(other) for other in g)]
+        groups = [g for g in groups if g not in near] + [[pair, *(p for g in near for p in g)]]
+    return groups
+
+
+def together(findings):
+    """One finding for many objects with the same cause: the first one's words, and all their remedies."""
+    by = {}
+    for f in findings:
+        by.setdefault(f.cause, []).append(f)
+    for cause, some in by.items():
+        if cause not in TOGETHER or len(some) <= ALONE:
+            yield from some
+            continue
+        some.sort(key=lambda f: -f.number)
+        first = some[0]
+        yield replace(first, objects=[name for f in some for name in f.objects], text=f"{first.text} (on {first.objects[0]}); so with {len(some) - 1} others",
+                      memory=sum(f.memory for f in some), apply=chained([f.apply for f in some]))
+
+
+#: Causes of which many findings become one; their remedies change one mesh each.
+TOGETHER = {"slivers", "diagonal", "sub-pixel"}
 CAUSES = (unreached, duplicates, made_real, slivers, diagonals, sub_pixel, teapot_in_a_stadium, overlapping)

@@ -16,19 +16,23 @@ class Ledger:
 
     def __init__(self, index, n_objects):
         self.n = n_objects
-        self.tests, self.hits = np.zeros(n_objects), np.zeros(n_objects)
+        self.tests, self.hits, self.blocks = np.zeros((3, n_objects))   # blocks: shadow rays that they stop or let through
         self.steps = np.zeros(n_objects + 1)                            # the last: of rays that are tested against nothing
         self.object_of = np.concatenate([k.object_of for k in index.primitives.kinds]) if index.primitives.kinds else np.zeros(0, int)
         self.of_primitive = np.zeros(index.primitives.n)
         self.rays = 0
+        self.index = index
         self._traverse, index.traverse = index.traverse, self.traverse
 
     def traverse(self, rays, query):
-        test, pairs = query.test, []
+        test, pairs, shadow = query.test, [], not hasattr(query, "item")
 
         def booked(ray, item):
             pairs.append((np.asarray(ray, np.int64), np.asarray(item, np.int64)))
-            return test(ray, item)
+            met = test(ray, item)
+            if shadow:
+                self.blocks += np.bincount(self.object_of[pairs[-1][1][met]], minlength=self.n)
+            return met
 
         query.test = booked
         before = query.counts.n_ts.copy() if query.counts else None
@@ -44,8 +48,13 @@ class Ledger:
             steps, tested = query.counts.n_ts - before, np.bincount(ray, minlength=rays.n)
             self.steps[:-1] += np.bincount(owner, (steps / np.maximum(tested, 1))[ray], minlength=self.n)
             self.steps[-1] += steps[tested == 0].sum()
-        if hasattr(query, "item"):
+        if not shadow:
             self.hits += np.bincount(self.object_of[query.item[query.item >= 0]], minlength=self.n)
+
+
+    def close(self):
+        """Book no more."""
+        del self.index.traverse
 
 
 def picture_size(scene, side=SIDE):
@@ -69,6 +78,7 @@ def measure(scene, technique="bvh", size=None, depth=5, progress=None, parameter
     ledger = Ledger(index, len(scene.objects))                          # from here: what is asked beforehand is no part of the picture
     for _ in rendering.tiles():
         pass
+    ledger.close()
     return ledger, rendering.result
 
 

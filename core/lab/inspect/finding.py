@@ -22,6 +22,8 @@ class Finding:
         Share of the tests and steps of the picture that the remedy saves; None where it was not tried.
     memory : float
         Bytes saved, about.
+    same : bool
+        Whether the picture has to be the same with the remedy.
     """
 
     objects: list
@@ -31,6 +33,7 @@ class Finding:
     number: float
     gain: float = None
     memory: float = 0.0
+    same: bool = False
     apply: object = field(default=None, repr=False, compare=False)
 
 

@@ -3,11 +3,14 @@
 import math
 from dataclasses import dataclass
 
+import numpy as np
+
 from ...errors import Cancelled, SceneError
-from .causes import CAUSES
+from .causes import CAUSES, together
 from .costs import SIDE, by_object, measure, picture_size, work_of
 from .finding import merged
 from .shapes import own_corners
+from .sight import in_sight, never_met
 
 #: A picture that would take more tests and steps than this is traced smaller, a quarter as wide at least.
 MOST_WORK = 20_000_000
@@ -89,8 +92,11 @@ def inspect(scene, technique="bvh", size=(640, 480), depth=5, checked=CHECKED, p
     corners = own_corners(scene)
     total, work = float(ledger.tests.sum()), work_of(result)
     tests = [ledger.of_primitive[ledger.object_of == k] for k in range(len(scene.objects))]
-    given = dict(corners=corners, tests=tests, total=total, technique=technique, size=size)
-    findings = merged(f for cause in CAUSES for f in cause(scene, ledger, **given))
+    never = never_met(scene, ledger)
+    seen = in_sight(scene, ledger, never)
+    unseen = [k for k in never if k not in seen]
+    given = dict(corners=corners, tests=tests, total=total, technique=technique, size=size, unseen=unseen)
+    findings = list(together(merged(f for cause in CAUSES for f in cause(scene, ledger, **given))))
 
     def promise(finding):
         """What a finding could bring at most: the share of the tests on its objects."""
@@ -104,6 +110,8 @@ def inspect(scene, technique="bvh", size=(640, 480), depth=5, checked=CHECKED, p
         if changed.n_primitives:
             _, again = measured(changed, other, pixels, k + 2, parameters if other == technique else None)
             finding.gain = 1.0 - work_of(again) / max(work, 1)
+            if finding.same and not np.allclose(again.image, result.image, rtol=1e-4, atol=1e-6):
+                findings.remove(finding)                                # it matters after all
     # What was tried and gains nothing is no finding.
     findings = [f for f in findings if f.gain is None or f.gain >= LEAST_GAIN or f.memory]
     findings.sort(key=lambda f: (-(f.gain if f.gain is not None else 0.0), -f.memory))

@@ -44,13 +44,25 @@ def linked(numbers):
     return apply
 
 
-def united(a, b, corners):
-    """A remedy: of two objects the triangles are left out whose middle lies inside the other."""
+def united(pairs, corners):
+    """A remedy: of objects that overlap in pairs the triangles are left out whose middle lies inside another."""
     def apply(scene):
-        kept = {k: corners[k][~_inside(scene, corners[k].mean(axis=1), other)] for k, other in ((a, b), (b, a))}
-        for k, own in kept.items():
-            scene = with_mesh(k, own)(scene) if len(own) else scene
-        return without(*(k for k, own in kept.items() if not len(own)))(scene)
+        kept = {k: np.ones(len(corners[k]), bool) for pair in pairs for k in pair}
+        for a, b in pairs:
+            for k, other in ((a, b), (b, a)):
+                kept[k] &= ~_inside(scene, corners[k].mean(axis=1), other)
+        for k, some in kept.items():
+            scene = with_mesh(k, corners[k][some])(scene) if some.any() else scene
+        return without(*(k for k, some in kept.items() if not some.any()))(scene)
+    return apply
+
+
+def chained(remedies):
+    """A remedy: all of these, none of which takes an object away."""
+    def apply(scene):
+        for remedy in remedies:
+            scene = remedy(scene)
+        return scene
     return apply
 
 
