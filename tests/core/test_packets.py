@@ -2,7 +2,8 @@
 import numpy as np
 import pytest
 from rayscope.core import Camera, Scene, build
-from rayscope.core.fast.hierarchies import packets
+from rayscope.core.fast.hierarchies import few, packets
+from rayscope.core.fast.query import Closest, Occluded
 
 from .datasets import DATASETS
 
@@ -61,3 +62,37 @@ def test_awkward_rays_in_packets(name, monkeypatch):
     expected = build(scene, "brute").closest(o, d, t_min=t_min, t_max=t_max)
     np.testing.assert_array_equal(got.t, expected.t)
     np.testing.assert_array_equal(got.primitive, expected.primitive)
+
+
+def in_batches_of(size, ask, o, d, t_min, t_max):
+    """The answers of batches, one after the other."""
+    n = len(o)
+    t_min, t_max = np.broadcast_to(t_min, n), np.broadcast_to(t_max, n)
+    return [ask(*(values[first:first + size] for values in (o, d, t_min, t_max))) for first in range(0, n, size)]
+
+
+@pytest.mark.parametrize("size", [1, 11])
+@pytest.mark.parametrize("name", list(BY_NAME))
+def test_a_few_rays_find_what_many_find(name, size, monkeypatch):
+    scene = BY_NAME[name].scene(0)
+    o, d, t_min, t_max = (values[:44] if np.ndim(values) else values for values in BY_NAME[name].rays(scene, 0))
+    for more in {}, {"builder": "sah", "leaf_size": 5}:
+        index = build(scene, "bvh", **more)
+        monkeypatch.setattr(few, "FEW", 0)
+        many, blocked = index.closest(o, d, t_min, t_max), index.occluded(o, d, t_min, t_max)
+        monkeypatch.setattr(few, "FEW", 16)
+        parts = in_batches_of(size, index.closest, o, d, t_min, t_max)
+        for field in ("t", "primitive", "object", "u", "v", "normal"):
+            np.testing.assert_array_equal(np.concatenate([getattr(part, field) for part in parts]), getattr(many, field))
+        np.testing.assert_array_equal(np.concatenate(in_batches_of(size, index.occluded, o, d, t_min, t_max)), blocked)
+
+
+def test_a_few_rays_do_not_look_far_behind_what_they_hit(monkeypatch):
+    z = np.repeat(np.arange(500.0), 3)
+    layers = np.column_stack([np.tile([-1.0, 1.0, 0.0], 500), np.tile([-1.0, -1.0, 1.0], 500), z])
+    index = build(Scene.from_triangles(layers, np.arange(1500).reshape(-1, 3)), "bvh")
+    tested = []
+    for question in Closest, Occluded:
+        monkeypatch.setattr(question, "test", lambda self, ray, item, test=question.test: tested.extend(ray) or test(self, ray, item))
+    assert index.closest([(0, 0, -1)], [(0, 0, 1)]).primitive[0] == 0 and index.occluded([(0, 0, -1)], [(0, 0, 1)])[0]
+    assert 2 <= len(tested) <= 2 * few.LEAVES

@@ -1,12 +1,12 @@
 """Bounding volume hierarchy: a tree of axis-aligned boxes by one of several builders.
 
-A binary tree that is walked depth first is packed four-wide, in single precision. All else is walked in lock step, in
-double precision, and counts what the pure core counts.
+A binary tree that is walked depth first is packed four-wide, in single precision; a few rays go through it one by one.
+All else is walked in lock step, in double precision, and counts what the pure core counts.
 """
 
 from importlib import import_module
 
-from . import wide
+from . import few, wide
 from .order import order_of
 from .tree import Frame
 from .volume_tree import VolumeStructure, VolumeTree
@@ -41,12 +41,14 @@ class BVH(VolumeStructure):
             super().traverse(rays, query)
         elif rays.prepared is not None:
             wide.traverse(self.wide, rays.prepared, query)
+        elif rays.n <= few.FEW and query.counts is None:
+            few.traverse(self.wide, wide.enter(self.frame, rays), query)
         else:
             for some, unit in wide.runs(self.frame, rays):
                 wide.traverse(self.wide, unit, query, some)
 
     def divide(self, rays):
-        if self.wide is None:
+        if self.wide is None or rays.n <= few.FEW:
             return super().divide(rays)
         parts = []
         for some, unit in wide.runs(self.frame, rays):

@@ -73,6 +73,15 @@ class WideTree:
     def nbytes(self):
         return self.lines.nbytes + self.order.nbytes + sum(a.nbytes for a in (self.first, self.count) if a is not None)
 
+    def held(self, ray, leaf):
+        """Pairs of rays and leaves as pairs of rays and the primitives that the leaves hold."""
+        if self.first is None:
+            return ray, leaf
+        first, count = self.first[leaf], self.count[leaf]
+        ends = np.cumsum(count)
+        place = np.repeat(first - (ends - count), count) + np.arange(ends[-1])
+        return np.repeat(ray, count), self.order[place]
+
 
 def _collapse(tree):
     """Children (w, 4) of the wide nodes, breadth first; -1 for none. A root that is a leaf is its own only child."""
@@ -97,24 +106,25 @@ def _collapse(tree):
     return np.concatenate(out)
 
 
-class UnitRays:
-    """Rays of one octant in unit space, four times over, starting where they enter the scene.
+class Entered:
+    """Rays in unit space, starting where they enter the scene.
 
     Attributes
     ----------
-    octant : int
-        Bit k says that component k of the directions is negative.
     start, end : ndarray, shape (n,)
         Where the rays enter and leave the scene.
     size : float
         Of a unit, in the rays' space.
-    values, lines : list of 6 ndarray
-        x, y, z of origins, then of reciprocals, once, and four times over. The far end is kept apart, since it changes.
+    values : sequence of 6 ndarray, float32
+        x, y, z of origins, then of reciprocals. The far end is kept apart, since it changes.
     """
 
-    def __init__(self, octant, start, end, size, values):
-        self.octant, self.start, self.end, self.size, self.values = octant, start, end, size, values
-        self.lines = [four(column) for column in values]
+    def __init__(self, start, end, size, values):
+        self.start, self.end, self.size, self.values = start, end, size, values
+
+    def alive(self, t):
+        """Numbers of the rays that are in the scene before the distances t."""
+        return np.flatnonzero((self.start <= self.end) & (self.start * self.size <= t))
 
     def limit(self, t, ray=slice(None)):
         """Distances t of some rays as float32 distances from their starts, rounded up."""
@@ -122,25 +132,49 @@ class UnitRays:
             return ((t / self.size - self.start[ray]) * (1.0 + 2.0**-20) + 2.0**-40).astype(np.float32)
 
 
-def runs(frame, rays):
-    """Divide rays into runs that are traced together, each along a curve through its rays' origins.
+class UnitRays(Entered):
+    """Rays of one octant, four times over.
+
+    Attributes
+    ----------
+    octant : int
+        Bit k says that component k of the directions is negative.
+    lines : list of 6 ndarray
+        The values four times over.
+    """
+
+    def __init__(self, octant, *entered):
+        super().__init__(*entered)
+        self.octant = octant
+        self.lines = [four(column) for column in self.values]
+
+
+def enter(frame, rays):
+    """Rays where they enter the scene.
 
     A component smaller than `TINY` is taken to be `TINY`: over the scene's extent that moves the ray by far less than
     `PAD`, and no reciprocal is infinite.
+    """
+    start, end, columns = np.empty(rays.n), np.empty(rays.n), np.empty((6, rays.n), np.float32)
+    for first in range(0, rays.n, CHUNK):
+        some = slice(first, first + CHUNK)
+        start[some], end[some] = _enter(frame, rays.o[:, some], rays.d[:, some], rays.t_min[some], columns[:, some])
+    return Entered(start, end, frame.size, columns)
+
+
+def runs(frame, rays):
+    """Divide rays into runs that are traced together, each along a curve through its rays' origins.
 
     Returns
     -------
     list of (ndarray, UnitRays)
         The rays' numbers, in order; the directions of a run have the same signs, and those of a long one the same main axis.
     """
-    start, end, columns = np.empty(rays.n), np.empty(rays.n), np.empty((6, rays.n), np.float32)
-    for first in range(0, rays.n, CHUNK):
-        some = slice(first, first + CHUNK)
-        start[some], end[some] = _enter(frame, rays.o[:, some], rays.d[:, some], rays.t_min[some], columns[:, some])
+    entered = enter(frame, rays)
     # By the sign bit: the reciprocal of -0.0 counts as negative, too.
     sign = np.signbit(rays.d)
     octant = sign[0] + 2 * sign[1] + 4 * sign[2]
-    order = along_curve(columns[:3])
+    order = along_curve(entered.values[:3])
     octant_there, found = octant.take(order), []
     for k in np.flatnonzero(np.bincount(octant, minlength=8)):
         run = order.take(np.flatnonzero(octant_there == k))
@@ -148,7 +182,8 @@ def runs(frame, rays):
         if len(run) >= LONG:
             axis = rays.main_axis.take(run)
             parts = [run.take(np.flatnonzero(axis == a)) for a in range(3)]
-        found += [(part, UnitRays(int(k), start.take(part), end.take(part), frame.size, [c.take(part) for c in columns]))
+        found += [(part, UnitRays(int(k), entered.start.take(part), entered.end.take(part), frame.size,
+                                  [column.take(part) for column in entered.values]))
                   for part in parts if len(part)]
     return found
 
@@ -200,7 +235,7 @@ class _Traversal:
         t = query.t if number is None else query.t.take(number)
         self.limit = unit.limit(t)
         self.limit4 = four(self.limit)
-        alive = np.flatnonzero((unit.start <= unit.end) & (unit.start * unit.size <= t))
+        alive = unit.alive(t)
         signs = [unit.octant >> a & 1 for a in range(3)]
         self.near = [a + 3 * s for a, s in enumerate(signs)]
         self.far = [a + 3 - 3 * s for a, s in enumerate(signs)]
@@ -297,11 +332,7 @@ class _Traversal:
         if self.query.counts:
             self.query.counts.steps(self.there(ray))
             self.query.counts.elementary(self.there(ray))
-        if self.tree.first is not None:
-            first, count = self.tree.first[item], self.tree.count[item]
-            ends = np.cumsum(count)
-            place = np.repeat(first - (ends - count), count) + np.arange(ends[-1])
-            ray, item = np.repeat(ray, count), self.tree.order[place]
+        ray, item = self.tree.held(ray, item)
         hit = self.query.test(self.there(ray), item)
         ray = ray.take(hit)
         limit = self.unit.limit(self.query.t.take(self.there(ray)), ray)
