@@ -41,6 +41,17 @@ DEPTHS = (8, 16, 32, 64, 128, 256)
 TECHNIQUES, FLOAT32 = ("kd-tree", "grid", "octree"), ("embree", "mathutils")
 #: What random sampling is checked by: slope of error against samples, and how far it may be off, relatively.
 SLOPE, SLACK = -0.5, 0.15
+#: What columns mean, for the page.
+ABOUT = {
+    **MEASURES,
+    "T": "run time in seconds, the least of all runs",
+    "T_worst": "run time in seconds, the most of all runs",
+    "runs": "timed runs, taking turns with all other settings",
+    "rays": "rays of all kinds",
+    "tests": "intersection tests ray x primitive",
+    "against": "what the error is against: the reference; or, for techniques, the picture of the same samples",
+    "verdict": "another setting of the same knob that is faster and no less exact",
+}
 COLUMNS = ("curve", "setting", "T", "T_worst", "runs", "rays", "tests", *MEASURES, "against", "verdict")
 
 
@@ -126,7 +137,8 @@ def error_time(scene, size=(96, 72), seconds=120.0, seed=0, technique="bvh", pro
     -------
     dict
         rows : list of dict, a setting each, with the keys `COLUMNS`, ``times`` and ``options``; floor : float, the
-        reference's own RMSE; slopes : dict, curve -> slope of its error against samples, log-log; reference : dict; left_out : list of str; words : list of str; stopped : bool.
+        reference's own RMSE; slopes : dict, curve -> slope of its error against samples, log-log; reference : dict;
+        left_out : list of str; words : list of str; stopped : bool.
 
     Raises
     ------
@@ -354,7 +366,8 @@ class _Sweep:
         least = [(f"threshold {t:g}", {"threshold": t}) for t in (0.1, 0.03, 0.01)] if mirrors else alone
         rays = [(_shadow_rays(n), {"light_samples": n}) for n in (1, 4, 16)] if soft else alone
         # Rays do not scatter: neither shall cones.
-        for name, parameters, points in (("cones", {"gloss": False}, least), ("pyramids", {}, rays), ("beams", {}, rays)):
+        ways = (("cones", {"gloss": False}, least), ("pyramids", {}, rays), ("beams", {}, rays))
+        for name, parameters, points in ways:
             index = build(scene, name, **parameters)
             if not {kind.KIND for kind in index.primitives.kinds} & set(index.SUPPORTED):
                 known = ", ".join(index.SUPPORTED)
@@ -566,13 +579,14 @@ def plot(path, result, name, title):
 
     axes = figure.add_subplot(xlabel=x_title, ylabel=f"{y}: {MEASURES[y]}", title=title, xscale="log", yscale="log")
     # At the foot stands what has no error.
-    foot = 0.5 * min([r[y] for r in rows if r[y] > 0] + [result["floor"] or math.inf], default=1e-6)
+    floor = result["floor"] if y == "rmse" else 0.0
+    foot = 0.5 * min((value for value in (floor, *(r[y] for r in rows)) if value > 0), default=1e-6)
     for i, curve in enumerate(dict.fromkeys(r["curve"] for r in rows)):
         points = sorted((r for r in rows if r["curve"] == curve), key=lambda r: r[x])
         xs, ys = [r[x] for r in points], [r[y] or foot for r in points]
         alike = points[0]["against"] != "reference"
         line = "none" if alike else "-" if i < 10 else "--"
-        axes.plot(xs, ys, line, marker="osD^v<>pPX*h"[i % 12], color=f"C{i % 10}", linewidth=1, label=curve)
+        axes.plot(xs, ys, linestyle=line, marker="osD^v<>pPX*h"[i % 12], color=f"C{i % 10}", linewidth=1, label=curve)
         if x == "T":
             axes.hlines(ys, xs, [r["T_worst"] for r in points], color=f"C{i % 10}", alpha=0.4)
         if alike:
@@ -587,8 +601,8 @@ def plot(path, result, name, title):
             line = [ys[0] * (v / xs[0]) ** SLOPE for v in xs]
             axes.plot(xs, line, color="0.3", linestyle="-.", linewidth=1, label=f"slope {SLOPE:g}")
     if y == "rmse":
-        if result["floor"] > 0:
-            axes.axhline(result["floor"], color="0.5", linestyle="--", label="the reference's own error")
+        if floor > 0:
+            axes.axhline(floor, color="0.5", linestyle="--", label="the reference's own error")
         axes.axhline(STEP, color="0.5", linestyle=":", label="1/255")
     axes.grid(True, which="both", alpha=0.25)
     for axis in (axes.xaxis, axes.yaxis):
@@ -637,7 +651,7 @@ def _page(result, title, pictures, note):
         kind = "" if isinstance(value, str) else " class=n"
         return f"<td{kind}>{html.escape(report.text(value, column))}</td>"
 
-    head = "".join(f"<th title='{html.escape(MEASURES.get(c, c))}'>{c}</th>" for c in COLUMNS)
+    head = "".join(f"<th title='{html.escape(ABOUT.get(c, c))}'>{c}</th>" for c in COLUMNS)
     body = "".join(f"<tr>{''.join(cell(r, c) for c in COLUMNS)}</tr>" for r in result["rows"])
     images = "".join(
         f"<img alt='{p.stem}' src='data:image/png;base64,{base64.b64encode(p.read_bytes()).decode()}'>"
