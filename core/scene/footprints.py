@@ -3,10 +3,12 @@
 from ..errors import Notice
 from .ears import area, ears, flattened, turn
 
-#: What is worth no more than so much of a ray is not looked at as a whole, and of pieces worth less some are left out.
+#: Of pieces that are worth less than so much of a ray some are left out.
 SMALL = 0.25
+#: Cones are sampled that are worth no more rays than these, those to lights and others: a cone costs some ten rays.
+SHADOW_RAYS, RAYS = 4.0, 1.0
 #: Cones that reach more primitives than this are sampled, which is less work.
-MANY = 256
+MANY = 96
 #: The triangles' areas add up to the polygon's but for so much of it, or the polygon crosses itself.
 TOLERANCE = 1e-9
 

@@ -5,7 +5,7 @@ wide as surfaces bend and scatter them.
 
 A wide cone sees hundreds of small pieces, and each would be shaded, need shadows and send on cones. Of those that weigh
 little in the pixel some are therefore chosen, at random, to stand for the others: the expected value is the same. What
-weighs less than a ray (see :mod:`.footprint_tracer`) has shadow rays instead of shadow cones.
+is worth no more than a few rays (see :mod:`.footprint_tracer`) has shadow rays instead of shadow cones.
 """
 
 import math
@@ -14,7 +14,7 @@ from dataclasses import replace
 import numpy as np
 
 from ...hits import Hits
-from ...scene.footprints import SMALL
+from ...scene.footprints import SHADOW_RAYS, SMALL
 from ..tracing import sampling
 from ..tracing.vectors import dot, frame, pushed, unit
 from ..tracing.whitted import COUNTED, REFLECTED, SHADOW, TRANSPARENT
@@ -140,7 +140,7 @@ class ConeTracer(FootprintTracer):
         if not (self.soft_cones and light.has_extent):
             return super()._transmitted(surface, which, to, reach, light, pixel)
         out = np.empty((3, len(which)) if self.coloured_shadows else len(which))
-        rays, pace = np.where(self._lit[0][which] <= 1.0, 1.0, 0.0), self.pace["shadow"]
+        rays, pace = np.where(self._lit[0][which] <= SHADOW_RAYS, 1.0, 0.0), self.pace["shadow"]
         whole = np.flatnonzero(rays == 0.0)
         for some in pace.slices(len(whole)):
             self.check()
@@ -205,10 +205,12 @@ class ConeTracer(FootprintTracer):
         """Share of light, shape (3, m), that passes through the pieces."""
         from ..tracing.shadows import passed
 
-        found, fields = self._hits(structure, outlines, outlines.s, outlines.t)
-        d = outlines.cones.rays(outlines.cone[found], outlines.s[found], outlines.t[found])[1]
         colour = np.zeros((3, len(outlines)))
-        colour[:, found] = passed(self.surfaces.table, self.surfaces.at(Hits(**fields), np.arange(len(found)), d), d)
+        some = np.flatnonzero(np.array(self.lets_light)[structure.pieces.place[0, outlines.item]])
+        part = outlines.take(some)
+        found, fields = self._hits(structure, part, part.s, part.t)
+        d = part.cones.rays(part.cone[found], part.s[found], part.t[found])[1]
+        colour[:, some[found]] = passed(self.surfaces.table, self.surfaces.at(Hits(**fields), np.arange(len(found)), d), d)
         # A sphere that is met from outside is left again.
         twice = outlines.round_[~outlines.far_side] if len(outlines.round_) else outlines.round_
         colour[:, twice] *= colour[:, twice]

@@ -5,14 +5,14 @@ its share; what is left sees the surroundings.
 
 The parameter ``samples`` says how many rays a whole pixel is worth. A cone that reaches what cannot be tested as a whole
 becomes as many rays as its weight in the pixel is worth, at least one, spread over it at random. So does a cone that is
-worth a small part of a ray, and one that reaches a crowd of primitives, with more rays. The work in a pixel is bounded
+worth no more than a ray, and one that reaches a crowd of primitives, with more rays. The work in a pixel is bounded
 for that reason, however many surfaces rays are sent on by, and the expected value is the mean over the cone.
 """
 
 import numpy as np
 
 from ...hits import Hits
-from ...scene.footprints import SMALL
+from ...scene.footprints import RAYS
 from ..rays import Rays
 from ..tracing import sampling
 from ..tracing.whitted import COUNTED, PRIMARY, REFLECTED, REFRACTED, TRANSPARENT, Wave, Whitted
@@ -132,7 +132,7 @@ class FootprintTracer(Whitted):
             wave = _rays(wave)
             return wave, self._closest(wave)
         worth = self.worth(wave.weight)
-        rays = np.where((wave.kind != PRIMARY) & (worth <= SMALL), 1.0, 0.0)
+        rays = np.where((wave.kind != PRIMARY) & (worth <= RAYS), 1.0, 0.0)
         whole, parts = np.flatnonzero(rays == 0.0), []
         for some in pace.slices(len(whole)):
             which = whole[some]

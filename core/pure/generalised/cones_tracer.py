@@ -5,13 +5,13 @@ wide as surfaces bend and scatter them.
 
 A wide cone sees hundreds of small pieces, and each would be shaded, need shadows and send on cones. Of those that weigh
 little in the pixel some are therefore chosen, at random, to stand for the others: the expected value is the same. What
-weighs less than a ray (see :mod:`.footprint_tracer`) has shadow rays instead of shadow cones.
+is worth no more than a few rays (see :mod:`.footprint_tracer`) has shadow rays instead of shadow cones.
 """
 
 import math
 from dataclasses import replace
 
-from ...scene.footprints import SMALL
+from ...scene.footprints import SHADOW_RAYS, SMALL
 from ..tracing import sampling
 from ..tracing.vectors import add, cross, dot, frame, minus, mul, pushed, times, unit
 from ..tracing.whitted import REFLECTED, SHADOW, TRANSPARENT
@@ -121,7 +121,7 @@ class ConeTracer(FootprintTracer):
             return super()._transmitted(surface, to, reach, light)
         path = self._path_to[id(surface)]
         worth = self.worth(path.weight)
-        if worth <= 1.0:
+        if worth <= SHADOW_RAYS:
             return self._open_to_rays(surface, to, reach, light, path.key, worth)
         o = pushed(surface.point, surface.error, surface.normal, to)
         d, t_max = to, math.inf
@@ -164,7 +164,9 @@ class ConeTracer(FootprintTracer):
         """Share of light, a colour, that passes through a piece."""
         from ..tracing.shadows import passed
 
-        hit = hit_of(structure, outline, outline.s, outline.t)
+        hit = None
+        if self.lets_light[structure.primitives[outline.item].object]:
+            hit = hit_of(structure, outline, outline.s, outline.t)
         if hit is None:
             return 0.0, 0.0, 0.0
         d = outline.cone.ray(outline.s, outline.t)[1]

@@ -5,14 +5,14 @@ its share; what is left sees the surroundings.
 
 The parameter ``samples`` says how many rays a whole pixel is worth. A cone that reaches what cannot be tested as a whole
 becomes as many rays as its weight in the pixel is worth, at least one, spread over it at random. So does a cone that is
-worth a small part of a ray, and one that reaches a crowd of primitives, with more rays. The work in a pixel is bounded
+worth no more than a ray, and one that reaches a crowd of primitives, with more rays. The work in a pixel is bounded
 for that reason, however many surfaces rays are sent on by, and the expected value is the mean over the cone.
 """
 
 import math
 from dataclasses import dataclass, replace
 
-from ...scene.footprints import SMALL
+from ...scene.footprints import RAYS
 from ..ray import Ray
 from ..structure import Hit
 from ..tracing import sampling
@@ -104,7 +104,7 @@ class FootprintTracer(Whitted):
         if not isinstance(structure, FootprintTree):
             return [self._traced(path.as_ray())]
         worth = self.worth(path.weight)
-        if path.kind != PRIMARY and worth <= SMALL:
+        if path.kind != PRIMARY and worth <= RAYS:
             return self._spread(path, worth)
         outlines, sampled, n_it, n_ts = structure.within(path.cone)
         if sampled:
