@@ -136,9 +136,12 @@ class RAYSCOPE_PT_error(panels.Sidebar, bpy.types.Panel):
         for text in words:
             for i, line in enumerate(textwrap.wrap(text, max(24, context.region.width // 8))):
                 column.label(text=line, icon="DOT" if i == 0 else "BLANK1")
-        for image in bpy.data.images:
-            if words and image.name.startswith(IMAGES):
-                layout.label(text=image.name, icon="IMAGE_DATA")
+        images = [image.name for image in bpy.data.images if image.name.startswith(IMAGES)]
+        if words and images:
+            column = layout.column(align=True)
+            column.label(text="To be seen in an Image Editor:")
+            for name in images:
+                column.label(text=name, icon="IMAGE_DATA")
 
 
 _register, _unregister = bpy.utils.register_classes_factory((RAYSCOPE_OT_error, RAYSCOPE_PT_error))
