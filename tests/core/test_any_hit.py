@@ -6,12 +6,15 @@ from rayscope.core import Scene, build
 N = 600
 
 
-def grazing(rng):
-    """A large triangle, points on it but for rounding, and directions that hardly leave its plane."""
+def grazing(rng, narrow):
+    """A triangle, points on it but for rounding, some of them its corners, and directions that hardly leave its plane."""
     corners = rng.normal(size=(3, 3)) * 10.0 ** rng.uniform(-2, 2)
+    if narrow:
+        corners[2] = corners[1] + 10.0 ** rng.uniform(-9, -4) * corners[2]
     weights = rng.dirichlet(np.ones(3), N)
     o = weights @ corners
     o += rng.integers(-3, 4, o.shape) * np.spacing(o)
+    o[::5] = corners[rng.integers(0, 3, len(o[::5]))]
     other = rng.dirichlet(np.ones(3), N) @ corners
     normal = np.cross(corners[1] - corners[0], corners[2] - corners[0])
     normal /= np.linalg.norm(normal)
@@ -22,9 +25,10 @@ def grazing(rng):
     return Scene.from_triangles(corners, [(0, 1, 2)]), o, d
 
 
-@pytest.mark.parametrize("seed", range(6))
-def test_ends_at_the_hit(seed):
-    scene, o, d = grazing(np.random.default_rng(seed))
+@pytest.mark.parametrize("narrow", [False, True])
+@pytest.mark.parametrize("seed", range(4))
+def test_ends_at_the_hit(seed, narrow):
+    scene, o, d = grazing(np.random.default_rng(seed), narrow)
     fast, pure = build(scene, "brute"), build(scene, "brute", "pure")
     hits = fast.closest(o, d)
     t = np.asarray(hits.t)

@@ -242,6 +242,37 @@ def shadow_rays_are_right(light, index, brute, o, d):
     assert np.array_equal(towards.occluded(o, beside, 0.0, far), brute.occluded(o, beside, 0.0, far))
 
 
+@pytest.mark.parametrize("name, kind", in_turn(LIGHTS, 1))
+def test_shadow_rays_of_which_few_are_tested(name, kind, monkeypatch):
+    """From the first ray on what is surely met is not tested."""
+    from rayscope.core.fast.directional import lists
+    monkeypatch.setattr(lists, "WORTH", 0)
+    shadow_rays_are_right(*lit(name, kind, "fast", faces="uniform"))
+
+
+@pytest.mark.parametrize("kind", ["triangle", "box", "sphere", "polygon", "cone"])
+def test_what_is_surely_met_is_not_tested(kind, monkeypatch):
+    from rayscope.core.fast.directional import lists
+    scene, o = behind(kind)
+    brute, tests = build(scene, "brute"), {}
+    for worth in (np.inf, 0):
+        monkeypatch.setattr(lists, "WORTH", worth)
+        index = build(scene, "light-buffer")
+        for light in scene.lights:
+            d = np.array(light.position) - o if light.kind == "point" else np.broadcast_to(-np.array(light.direction), o.shape)
+            # To the light, to before the occluder, from behind it, and where it lets light through.
+            far = 1.0 - 1e-12 if light.kind == "point" else math.inf
+            for t_min, t_max in ((0.0, far), (0.0, 0.1), (0.5, far)):
+                for through in (None, [False, True]):
+                    more = {"through": through} if through else {}
+                    got, counts = index.for_light(light).occluded(o, d, t_min, t_max, count=True, **more)
+                    assert np.array_equal(got, brute.occluded(o, d, t_min, t_max, **more))
+                    if t_max == far and not t_min and not through:
+                        tests[worth, light.name] = counts["n_it"].sum()
+    for light in scene.lights:
+        assert tests[0, light.name] < 0.9 * tests[np.inf, light.name]
+
+
 @pytest.mark.parametrize("core", CORES)
 @pytest.mark.parametrize("max_bytes, resolution", [(1e3, 0), (1e5, 64), (256e6, 1)])
 def test_light_buffers_within_limits(core, max_bytes, resolution):

@@ -37,18 +37,18 @@ class Cube:
     def nbytes(self):
         return sum(face.nbytes for face in self.faces.values()) + (self._joined.nbytes if self._joined else 0)
 
-    def test(self, query, ray, number, u, v, nearness, end):
+    def test(self, query, ray, number, u, v, *depths):
         """Test rays through the faces `number`, else as :meth:`Listed.test`; all faces at once, as numpy's calls have their price."""
         there = np.flatnonzero(np.bincount(number, minlength=6)).tolist()
         if not self._first.keys() >= set(there):
             faces = [self.face(k) for k in {*there, *self._first}]
-            self._joined = Listed.joined(faces)
+            self._joined = Listed(faces)
             self._first = dict(zip({*there, *self._first}, np.cumsum([0] + [len(face.covered) for face in faces]).tolist()))
         cell = np.empty(len(number), np.int64)
         for k in there:
             at = np.flatnonzero(number == k)
             cell[at] = self.faces[k].cell(u.take(at), v.take(at)) + self._first[k]
-        return self._joined.test(query, ray, cell, u, v, nearness, end)
+        return self._joined.test(query, ray, cell, u, v, *depths)
 
     def face(self, number):
         """The lists of one face: 0 to 5 are +x, -x, +y, -y, +z, -z."""
@@ -74,11 +74,13 @@ class Cube:
         size = np.abs(w)
         x, y, z = size
         axis = np.where(z > np.maximum(x, y), 2, (y > x).astype(np.int64))
-        n = np.arange(w.shape[1])
-        along, right, up = (w[(axis + k) % 3, n] for k in range(3))
+        n, flat = w.shape[1], np.ascontiguousarray(w).ravel()
+        axis *= n
+        axis += np.arange(n)
+        along, right, up = (flat.take(axis + k * n, mode="wrap") for k in range(3))
         depth = np.abs(along)
         with np.errstate(all="ignore"):
-            return 2 * axis + (along < 0.0), right / depth, up / depth, depth
+            return 2 * (axis // max(n, 1)) + (along < 0.0), right / depth, up / depth, depth
 
 
 def ends(low, high):

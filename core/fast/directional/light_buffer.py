@@ -9,9 +9,10 @@ import numpy as np
 
 from ...errors import Notice
 from ...hits import Cells
+from ..rays import blocks
 from ..structure import Structure
 from .cube import Cube
-from .lists import LOSS, Lists, centre_buffer
+from .lists import LOSS, Listed, Lists, centre_buffer
 from .second import Handing
 from .view import View
 
@@ -83,9 +84,9 @@ class LightBuffer(Handing):
         if not len(which):
             return which
         buffer = self.buffer(number)
-        parts = buffer.parts
+        before = buffer.nbytes
         own = buffer.test(rays, query, which)
-        if buffer.parts != parts:
+        if buffer.nbytes != before:
             self._make_room(number)
         return which if not own.any() else which[~own]
 
@@ -144,10 +145,6 @@ class _Point:
         return self.cube.nbytes
 
     @property
-    def parts(self):
-        return len(self.cube.faces)
-
-    @property
     def counts(self):
         """Entries of each cell."""
         return [np.diff(face.start) for face in self.cube.faces.values()]
@@ -158,7 +155,16 @@ class _Point:
 
     def test(self, rays, query, which):
         """Test those of the rays `which` that go to the light, as far as lists tell; a mask of them."""
-        o, d, t_min, t_max = (rays.o, rays.d, rays.t_min, rays.t_max) if len(which) == rays.n else _some(rays, which)
+        part = rays if len(which) == rays.n else rays.take(which)
+        own, *columns = (np.concatenate(c, axis=-1) for c in zip(*(self._aimed(part.take(some)) for some in blocks(part.n))))
+        some = np.flatnonzero(own)
+        if len(some):
+            own[some[self.cube.test(query, which.take(some), *columns)]] = False
+        return own
+
+    def _aimed(self, rays):
+        """A mask of the rays that go to the light; of these, face, u, v, and the three depths of :meth:`Listed.test`."""
+        o, d, t_min, t_max = rays.o, rays.d, rays.t_min, rays.t_max
         with np.errstate(all="ignore"):
             w = o - self.cube.position[:, None]
             squared = d[0] * d[0] + d[1] * d[1] + d[2] * d[2]
@@ -167,19 +173,14 @@ class _Point:
             far = np.maximum(np.maximum(np.abs(o[0]), np.abs(o[1])), np.abs(o[2]))
             own = ((beside <= BESIDE * self.extra) & (far <= self.extra) & (reach > 0.0) & (t_min >= 0.0)
                    & ((t_max - reach) * np.sqrt(squared) <= BESIDE * self.extra) & (reach * np.sqrt(squared) > 2.0**-30 * self.extra))
-        if not own.any():
-            return own
         if not own.all():
             some = np.flatnonzero(own)
-            w, ray, start, stop = w[:, some], which[some], t_min[some] / reach[some], t_max[some] / reach[some]
-        else:
-            some, ray, start, stop = np.arange(len(which)), which, t_min / reach, t_max / reach
+            w, t_min, t_max, reach = w.take(some, axis=1), t_min.take(some), t_max.take(some), reach.take(some)
         number, u, v, z = Cube.through(w)
         # From the light, what lies farther than the ray's beginning does not matter.
         with np.errstate(divide="ignore"):
-            nearness, end = (1.0 - 4.0 * LOSS) / (z * (1.0 - start)), (1.0 - 4.0 * LOSS) / (z * (1.0 - stop))
-        own[some[self.cube.test(query, ray, number, u, v, nearness, end)]] = False
-        return own
+            begin, end = reach / (z * (reach - t_min)), (1.0 - 4.0 * LOSS) * reach / (z * (reach - t_max))
+        return own, number, u, v, (1.0 - 4.0 * LOSS) * begin, (1.0 + 4.0 * LOSS) * begin, end
 
 
 class _Sun:
@@ -196,15 +197,12 @@ class _Sun:
         # The scene lies behind the plane where z = 0, and within the window.
         view = View(centre - 2.0 * radius * forward, right, np.cross(forward, right), forward, (-radius, radius) * 2, False, extra)
         self.view, self.extra = view, view.extra
-        self.lists, self._make = None, lambda: Lists(view, primitives, resolution, most_bytes, **division)
+        self._make = lambda: Lists(view, primitives, resolution, most_bytes, **division)
+        self.lists = self.listed = None
 
     @property
     def nbytes(self):
-        return self.lists.nbytes if self.lists else 0
-
-    @property
-    def parts(self):
-        return int(self.lists is not None)
+        return self.lists.nbytes + self.listed.nbytes if self.lists else 0
 
     @property
     def counts(self):
@@ -215,14 +213,17 @@ class _Sun:
         """The lists, in a list."""
         if not self.view.usable:
             return []
-        self.lists = self.lists or self._make()
+        if self.lists is None:
+            self.lists = self._make()
+            self.listed = Listed([self.lists])
         return [self.lists]
 
     def test(self, rays, query, which):
         """Test those of the rays `which` that go to the sun, as far as lists tell; a mask of them."""
         if not self.view.usable:
             return np.zeros(len(which), bool)
-        o, d, t_min, t_max = (rays.o, rays.d, rays.t_min, rays.t_max) if len(which) == rays.n else _some(rays, which)
+        part = rays if len(which) == rays.n else rays.take(which)
+        o, d, t_min, t_max = part.o, part.d, part.t_min, part.t_max
         view = self.view
         forward = view.rows[2]
         along = forward[0] * d[0] + forward[1] * d[1] + forward[2] * d[2]
@@ -233,13 +234,14 @@ class _Sun:
             u, v, z, _ = view.points(o)
         seen = np.flatnonzero(own & (np.abs(u) <= 1.0) & (np.abs(v) <= 1.0))
         if len(seen):
-            self.lists = self.lists or self._make()
+            self.windows()
             start = z[seen] + t_min[seen] * along[seen]
-            nearness = -start - 4.0 * LOSS * (np.abs(start) + np.abs(z[seen]))
+            loss = 4.0 * LOSS * (np.abs(start) + np.abs(z[seen]))
             with np.errstate(invalid="ignore"):
                 stop = z[seen] + t_max[seen] * along[seen]
                 end = np.where(stop > -np.inf, -stop - 4.0 * LOSS * (np.abs(stop) + np.abs(z[seen])), np.inf)
-            own[seen[self.lists.test(query, which[seen], self.lists.cell(u[seen], v[seen]), u[seen], v[seen], nearness, end)]] = False
+            cell = self.lists.cell(u[seen], v[seen])
+            own[seen[self.listed.test(query, which[seen], cell, u[seen], v[seen], -start - loss, -start + loss, end)]] = False
         return own
 
 
@@ -251,8 +253,3 @@ def joined(parts):
     for part, before in zip(parts, first):
         part[4] = np.where(part[4] >= 0, part[4] + before, -1)
     return Cells.quads(*(np.concatenate(column) for column in zip(*parts)))
-
-
-def _some(rays, which):
-    part = rays.take(which)
-    return part.o, part.d, part.t_min, part.t_max

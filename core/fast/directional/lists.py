@@ -27,16 +27,21 @@ MOST_ALONG = 2048
 FIRST_ROUND = 4
 #: Pairs looked at together.
 PAIRS = 65_536
+#: Pairs looked at that are worth as much as what tells where one primitive is surely met.
+WORTH = 4
 #: Nearness lost in single precision, relative.
 LOSS = 2.0**-20
 
 
 class Listed:
-    """Cells with their lists.
+    """Lists as rays look at them: those of several windows, one window after the other.
 
     Attributes
     ----------
-    feet : Footprints
+    item : ndarray, shape (f,)
+        Primitives of the footprints.
+    nearest : ndarray, shape (f,), float32
+        Their greatest nearness.
     start : ndarray, shape (cells + 1,)
         Where each cell's entries begin.
     entry : ndarray, int32
@@ -46,24 +51,26 @@ class Listed:
     cuts : bool
         Whether there may be full occluders.
     nbytes : int
+
+    Parameters
+    ----------
+    windows : list of Lists
     """
 
-    def __init__(self, feet, start, entry, covered, cuts):
-        self.feet, self.start, self.entry, self.covered, self.cuts = feet, start, entry, covered, cuts
-        self.nbytes = feet.nbytes + start.nbytes + entry.nbytes + covered.nbytes
+    def __init__(self, windows):
+        self.windows = windows
+        first = np.cumsum([0] + [len(w.feet) for w in windows])
+        count = [np.diff(w.start) for w in windows]
+        self.start = np.concatenate([[0], np.cumsum(np.concatenate(count))])
+        self.entry = np.concatenate([w.entry + before for w, before in zip(windows, first)]).astype(np.int32)
+        self.covered = np.concatenate([np.where(w.covered >= 0, w.covered + before, -1) for w, before in zip(windows, first)])
+        self.cuts = any(w.cuts for w in windows)
+        self.item, self.nearest = (np.concatenate([getattr(w.feet, name) for w in windows]) for name in ("item", "nearest"))
+        self.boxes, self.edges, self.planes = (np.concatenate(rows) for rows in zip(*(_rows(w.feet) for w in windows)))
+        self._inner, self._looked = None, 0
+        self.nbytes = sum(a.nbytes for a in (self.start, self.entry, self.covered, self.item, self.nearest, self.boxes, self.edges, self.planes))
 
-    @classmethod
-    def joined(cls, parts):
-        """The cells of several windows, one window after the other."""
-        feet = Footprints.joined([part.feet for part in parts])
-        first = np.cumsum([0] + [len(part.feet) for part in parts])
-        count = [np.diff(part.start) for part in parts]
-        entry = [part.entry + before for part, before in zip(parts, first)]
-        covered = [np.where(part.covered >= 0, part.covered + before, -1) for part, before in zip(parts, first)]
-        return cls(feet, np.concatenate([[0], np.cumsum(np.concatenate(count))]), np.concatenate(entry).astype(np.int32),
-                   np.concatenate(covered), any(part.cuts for part in parts))
-
-    def test(self, query, ray, cell, u, v, nearness, end=None):
+    def test(self, query, ray, cell, u, v, nearness, begin, end):
         """Test rays against what is listed where they pass a window.
 
         Parameters
@@ -75,7 +82,9 @@ class Listed:
         u, v : ndarray
         nearness : ndarray
             Least nearness that matters to each ray, with something to spare.
-        end : ndarray, optional
+        begin : ndarray
+            Nearness that each ray surely does not reach back to.
+        end : ndarray
             Greatest nearness that each ray reaches, or less.
 
         Returns
@@ -85,57 +94,106 @@ class Listed:
             a ray that does not pass it may meet, and what is not the nearest hit.
         """
         refused = np.flatnonzero(self.covered.take(cell) >= 0) if self.cuts else np.zeros(0, np.int64)
-        if len(refused) and isinstance(query, Occluded) and end is not None:
-            first = self.feet.nearest.take(self.entry.take(self.start.take(cell.take(refused))))
-            passes = query.passes(self.feet.item.take(self.covered.take(cell.take(refused))))
+        any_hit = isinstance(query, Occluded)
+        if len(refused) and any_hit:
+            first = self.nearest.take(self.entry.take(self.start.take(cell.take(refused))))
+            passes = query.passes(self.item.take(self.covered.take(cell.take(refused))))
             refused = refused[~(end.take(refused) >= first) | passes]
         if len(refused):
             tested = np.ones(len(cell), bool)
             tested[refused] = False
-            cell, ray, u, v, nearness = (c[tested] for c in (cell, ray, u, v, nearness))
+            cell, ray, u, v, nearness, begin, end = (c[tested] for c in (cell, ray, u, v, nearness, begin, end))
         # Cell by cell: neighbours look at the same entries, which are then at hand.
         key = np.sort(cell << 32 | np.arange(len(cell)))
         cell, order = key >> 32, key & 0xFFFFFFFF
-        ray, u, v, nearness = (c.take(order) for c in (ray, u, v, nearness))
-        cursor, end = self.start.take(cell), self.start.take(cell + 1)
+        # What is lost in single precision has been allowed for.
+        with np.errstate(over="ignore"):
+            u, v, nearness, begin, end = (c.astype(np.float32).take(order) for c in (u, v, nearness, begin, end))
+        ray = ray.take(order)
+        cursor, last = self.start.take(cell), self.start.take(cell + 1)
         if query.counts:
             query.counts.steps(ray)
-            query.counts.elementary(ray, np.flatnonzero(cursor == end))
-        u, v, nearness = (c.astype(np.float32) for c in (u, v, nearness))
+            query.counts.elementary(ray, np.flatnonzero(cursor == last))
 
         def matters(live):
             # The nearest entry left must be near enough, and the ray not blocked already.
-            first = self.feet.nearest.take(self.entry.take(cursor.take(live)))
+            first = self.nearest.take(self.entry.take(cursor.take(live)))
             return (first >= nearness.take(live)) & (query.t.take(ray.take(live)) > -np.inf)
 
-        for which, place in in_rounds(cursor, end, matters):
-            self._look(query, ray, u, v, nearness, which, self.entry.take(place))
+        for which, place in in_rounds(cursor, last, matters):
+            which, foot, own_u, own_v = self._seen(u, v, nearness, which, self.entry.take(place))
+            own, item = ray.take(which), self.item.take(foot)
+            if any_hit:
+                sure = self._surely_met(own_u, own_v, begin, end, which, foot)
+                query.keep(own.take(sure), item.take(sure))
+            # The nearest of each ray first: often nothing else need be looked at.
+            first = np.ones(len(which), bool)
+            first[1:] = which[1:] != which[:-1]
+            for some in (first, ~first):
+                some = np.flatnonzero(some & (query.t.take(own) > -np.inf))
+                if len(some):
+                    query.test(own.take(some), item.take(some))
         return refused
 
-    def _look(self, query, ray, u, v, nearness, which, foot):
-        """Test pairs of rays and footprints."""
-        feet, limit = self.feet, nearness.take(which)
-        # Nearest first: often that alone tells.
-        keep = np.flatnonzero(feet.nearest.take(foot) >= limit)
-        foot, which, limit = foot.take(keep), which.take(keep), limit.take(keep)
-        own_u, own_v = u.take(which), v.take(which)
-        near = feet.near_u.take(foot) * own_u
-        near += feet.near_v.take(foot) * own_v
-        near += feet.near.take(foot)
-        # u and v were rounded, too.
-        near += np.float32(LOSS) * (np.abs(feet.near_u.take(foot)) + np.abs(feet.near_v.take(foot)))
-        keep = np.flatnonzero((near >= limit) & inside(feet, foot, own_u, own_v))
-        if len(keep):
-            query.test(ray.take(which.take(keep)), feet.item.take(foot.take(keep)))
+    def _seen(self, u, v, nearness, which, foot):
+        """Of pairs of rays and footprints those in which the ray may meet the primitive, and where it passes the window."""
+        u, v = u.take(which), v.take(which)
+        box = self.boxes.take(foot).view(np.float32).reshape(-1, 4)
+        keep = np.flatnonzero((box[:, 0] <= u) & (box[:, 1] <= v) & (box[:, 2] >= u) & (box[:, 3] >= v))
+        which, foot, u, v = (c.take(keep) for c in (which, foot, u, v))
+        plane = self.planes.take(foot).view(np.float32).reshape(-1, 4)
+        near = plane[:, 0] * u
+        near += plane[:, 1] * v
+        near += plane[:, 2]
+        there = np.minimum(near, plane[:, 3]) >= nearness.take(which)
+        edge = self.edges.take(foot, axis=0)
+        for k in (0, 2):
+            there &= edge[:, k] + edge[:, k + 1] * v <= u
+            there &= edge[:, k + 4] + edge[:, k + 5] * v >= u
+        keep = np.flatnonzero(there)
+        return (c.take(keep) for c in (which, foot, u, v))
+
+    def _surely_met(self, u, v, begin, end, which, foot):
+        """Positions of the pairs in which the ray surely meets the primitive between its ends, so that it need not be tested.
+
+        What tells (:meth:`Lists.inner_rows`) is made once it costs no more than it will have saved.
+        """
+        if self._inner is None:
+            self._looked += len(which)
+            if self._looked < WORTH * len(self.item):
+                return np.zeros(0, np.int64)
+            self._inner = np.concatenate([w.inner_rows() for w in self.windows])
+            self.nbytes += self._inner.nbytes
+        row = self._inner.take(foot, axis=0)
+        sure = (row[:, 0] * u + row[:, 1] * v + row[:, 2] > begin.take(which)) & (self.nearest.take(foot) < end.take(which))
+        for k in range(3, row.shape[1], 3):
+            sure &= row[:, k] * u + row[:, k + 1] * v + row[:, k + 2] > 0.0
+        return np.flatnonzero(sure)
 
 
-class Lists(Listed):
+def _rows(feet):
+    """Footprints by rows, as one fetch is quicker than many, wider by what single precision loses of u and v: bounds, edges, nearness."""
+    wide = np.float32(2.0 * LOSS)
+    boxes = np.stack([feet.u_lo - wide, feet.v_lo - wide, feet.u_hi + wide, feet.v_hi + wide], axis=1)
+    near = feet.near + np.float32(LOSS) * (np.abs(feet.near_u) + np.abs(feet.near_v))
+    planes = np.stack([feet.near_u, feet.near_v, near, feet.nearest], axis=1)
+    edges = [column for p, q, sign in ((feet.p0, feet.q0, -1), (feet.p1, feet.q1, -1), (feet.p2, feet.q2, 1), (feet.p3, feet.q3, 1))
+             for column in (p + sign * wide * (np.float32(1.0) + np.abs(q)), q)]
+    # Sixteen bytes are one complex number.
+    return boxes.view(np.complex128).ravel(), np.stack(edges, axis=1), planes.view(np.complex128).ravel()
+
+
+class Lists:
     """The lists of one window.
 
     Attributes
     ----------
+    feet : Footprints
     grid : Grid, Quadtree, or None
         Over the part of the window where there is anything.
+    start, entry, covered, cuts
+        As of :class:`Listed`.
+    nbytes : int
 
     Parameters
     ----------
@@ -156,7 +214,7 @@ class Lists(Listed):
     """
 
     def __init__(self, view, primitives, resolution=0, most_bytes=np.inf, which=None, adaptive=False, z_buffer=None, occludes=None):
-        self.view = view
+        self.view, self.primitives = view, primitives
         self.feet = feet = Footprints.of(view, primitives, which=which)
         self.grid, self.entry, self.nbytes = None, np.zeros(0, np.int32), 0
         # Nothing seen: one cell that lists nothing.
@@ -231,6 +289,19 @@ class Lists(Listed):
         self.entry = self.entry.take(kept)
         self.start = np.concatenate([[0], np.cumsum(np.bincount(cell.take(kept), minlength=len(u)))])
         self.nbytes = feet.nbytes + self.entry.nbytes + self.start.nbytes + self.covered.nbytes
+
+    def inner_rows(self):
+        """For each footprint 3 k numbers, float32, k planes a u + b v + c over the window: nearness is surely more than the first, and the
+        primitive surely there where all others are positive. They are less by what single precision loses."""
+        covers = Covers.of(self.view, self.primitives, self.feet.item)
+        with np.errstate(all="ignore"):
+            planes = np.concatenate([covers.low[:, None], covers.edges / np.abs(covers.edges).max(axis=0)], axis=1)
+            planes[2] -= 2.0 * LOSS * np.abs(planes).sum(axis=0)
+            planes = planes.astype(np.float32)
+        unknown = ~np.isfinite(planes).all(axis=(0, 1))
+        planes[:, :, unknown] = 0.0
+        planes[2, 1:, unknown] = -1.0
+        return planes.transpose(2, 1, 0).reshape(len(self.feet), 3 * planes.shape[1])
 
     def unlisted(self, primitives, z_buffer=None, finer=4):
         """Primitives that a finer z-buffer sees through cells that do not list them: none, if lists are conservative.

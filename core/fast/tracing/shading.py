@@ -6,7 +6,7 @@ import numpy as np
 
 from .lights import arriving
 from .sampling import LIGHTS, pair
-from .vectors import dot, unit
+from .vectors import columns, dot, unit
 
 
 def lit(table, surface, d, lights, transmitted, key, check):
@@ -68,23 +68,23 @@ def by_light(table, surface, d, lights, key, check):
         which = np.flatnonzero((cosine > 0.0) & (flat > 0.0) & (irradiance > 0.0))
         if not len(which):
             continue
-        m, base = surface.material[which], surface.base[:, which]
-        half = unit(towards[:, which] - view[:, which])
-        highlight = np.maximum(dot(surface.shading[:, which], half), 0.0) ** table.shininess[m]
+        m, base = surface.material[which], columns(surface.base, which)
+        half = unit(columns(towards, which) - columns(view, which))
+        highlight = np.maximum(dot(columns(surface.shading, which), half), 0.0) ** table.shininess[m]
         reflected = (table.diffuse[m] * cosine[which]) * base + highlight * (
             table.specular[m] + table.specular_base[m] * base
         )
         # Mirrors and glass reflect little but their narrow highlights: no shadow ray where there is nothing to shade.
         some = np.flatnonzero(reflected.any(axis=0))
-        which, reflected = which[some], reflected[:, some]
+        which, reflected = which[some], columns(reflected, some)
         if not len(which):
             continue
         arrives = irradiance[which] * (share / math.pi)
         if surface.shading is not surface.normal:
             arrives = arrives * terminator(
-                cosine[which], flat[which], dot(surface.normal[:, which], surface.shading[:, which])
+                cosine[which], flat[which], dot(columns(surface.normal, which), columns(surface.shading, which))
             )
-        yield light, which, to[:, which], reach, reflected * arrives * np.array(light.colour, float)[:, None]
+        yield light, which, columns(to, which), reach, reflected * arrives * np.array(light.colour, float)[:, None]
 
 
 def terminator(cosine, flat, between):

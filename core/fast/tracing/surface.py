@@ -7,7 +7,7 @@ import numpy as np
 from ...scene.material import Material
 from ...scene.scene import Mesh
 from ...scene.solids import slots
-from .vectors import dot, unit
+from .vectors import columns, dot, unit
 
 _SCALARS = (
     "ambient",
@@ -88,17 +88,17 @@ class Surface:
 
     def take(self, which):
         """Some of the surfaces."""
-        normal = self.normal[:, which]
+        normal = columns(self.normal, which)
         return Surface(
-            self.point[:, which],
+            columns(self.point, which),
             self.error[which],
             normal,
-            normal if self.shading is self.normal else self.shading[:, which],
+            normal if self.shading is self.normal else columns(self.shading, which),
             self.outside[which],
             self.material[which],
-            self.base[:, which],
+            columns(self.base, which),
             self.alpha[which],
-            self.place[:, which],
+            columns(self.place, which),
         )
 
 
@@ -209,7 +209,7 @@ class Surfaces:
     def _colour(self, material, obj, primitive, u, v):
         """Base colour and alpha."""
         table = self.table
-        base, alpha = table.base[:, material], table.alpha[material]
+        base, alpha = columns(table.base, material), table.alpha[material]
         if table.textures:
             from .texture import lookup
 

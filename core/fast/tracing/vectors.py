@@ -7,6 +7,11 @@ import numpy as np
 TINY = 1e-300
 
 
+def columns(a, which):
+    """Some of the columns, by numbers or as a slice; several times faster than numpy's indexing."""
+    return a[:, which] if isinstance(which, slice) else a.take(which, axis=1)
+
+
 def dot(a, b):
     """Dot products, shape (n,)."""
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]

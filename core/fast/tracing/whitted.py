@@ -13,11 +13,12 @@ import math
 import numpy as np
 
 from ...tracer import COUNTED, KINDS, PRIMARY, REFLECTED, REFRACTED, SHADOW, TRANSPARENT, Tracer
+from ..rays import blocks, part
 from . import sampling
 from .camera import primary
 from .probe import Probe
 from .surface import Surfaces
-from .vectors import dot, pushed, unit
+from .vectors import columns, dot, pushed, unit
 
 #: Rays of a wave, about.
 WAVE = 65_536
@@ -141,7 +142,7 @@ class Whitted(Tracer):
         while stack:
             wave, hits = self._met(self._next(stack))
             met = np.flatnonzero(hits.primitive >= 0)
-            surface = self.surfaces.at(hits, met, wave.d[:, met])
+            surface = self.surfaces.at(hits, met, columns(wave.d, met))
             if not out:
                 out = self._first(wave, hits, met, surface) if first else {}
                 out["combined"] = None
@@ -212,14 +213,15 @@ class Whitted(Tracer):
         """Add what rays see: the sky, or emission, ambient and local light."""
         missed = np.flatnonzero(hits.primitive < 0)
         if len(missed):
-            self._add(wave.pixel[missed], wave.weight[:, missed] * self._sky(wave.d[:, missed]))
+            self._add(wave.pixel[missed], columns(wave.weight, missed) * self._sky(columns(wave.d, missed)))
         if not len(met):
             return
         table, m = self.surfaces.table, surface.material
-        pixel, weight = wave.pixel[met], wave.weight[:, met] * surface.alpha
+        pixel, weight = wave.pixel[met], columns(wave.weight, met) * surface.alpha
         self._add(pixel, weight * (table.emission[:, m] + self.ambient[:, None] * (table.ambient[m] * surface.base)))
-        if self.lights:
-            self._add_light(surface, wave.d[:, met], wave.key[met] if self.soft else None, pixel, weight)
+        d, key = columns(wave.d, met), wave.key[met] if self.soft else None
+        for some in blocks(len(met)) if self.lights else ():
+            self._add_light(surface.take(some), d[:, some], part(key, some), pixel[some], weight[:, some])
 
     def _add_light(self, surface, d, key, pixel, weight):
         """Add what surfaces reflect of the lights, or let it wait until there are shadow rays enough."""
@@ -228,7 +230,7 @@ class Whitted(Tracer):
         # A tracer with a way of its own to ask about light asks at once.
         waits = self.waiting is not None and type(self)._transmitted is Whitted._transmitted
         for light, which, to, reach, seen in by_light(self.surfaces.table, surface, d, self.lights, key, self.check):
-            own, seen = pixel[which], weight[:, which] * seen
+            own, seen = pixel[which], columns(weight, which) * seen
             if light.shadows and waits:
                 probe = self._towards(light)
                 rays = self.waiting.setdefault(probe, [])
@@ -270,14 +272,14 @@ class Whitted(Tracer):
 
     def _shadow_rays(self, surface, which, to, reach):
         """Shadow rays from the surfaces `which`: o, d, how far they go, what they leave."""
-        point = surface.point[:, which]
-        o = pushed(point, surface.error[which], surface.normal[:, which], to)
+        point = columns(surface.point, which)
+        o = pushed(point, surface.error[which], columns(surface.normal, which), to)
         if math.isinf(reach):
-            return o, to, np.full(len(which), math.inf), surface.place[:, which]
+            return o, to, np.full(len(which), math.inf), columns(surface.place, which)
         # The ray starts beside the point, and must still end at the light.
         # A surface that the light lies in does not shade it.
         d = to + (point - o)
-        return o, d, np.maximum(1.0 - self.rounding / np.abs(d).max(axis=0), 0.0), surface.place[:, which]
+        return o, d, np.maximum(1.0 - self.rounding / np.abs(d).max(axis=0), 0.0), columns(surface.place, which)
 
     def _through(self, probe, o, d, reach, leaving, pixel):
         """Share of light that comes through along shadow rays, shape (n,) or (3, n)."""
@@ -326,7 +328,7 @@ class Whitted(Tracer):
             # Going straight on is no bounce: a leaf's cut-out corner must not use up the depth.
             share = np.broadcast_to(1.0 - surface.alpha, surface.base.shape)
             waves.append(
-                self._spawn(wave, met, surface, TRANSPARENT, wave.d[:, met], share, wave.t_max[met] - hits.t[met])
+                self._spawn(wave, met, surface, TRANSPARENT, columns(wave.d, met), share, wave.t_max[met] - hits.t[met])
             )
         if self.bounces:
             from .secondary import mirrored_and_refracted
@@ -336,7 +338,7 @@ class Whitted(Tracer):
             some = np.flatnonzero(sends & (wave.depth[met] < self.depth))
             if len(some):
                 part = surface.take(some)
-                both = mirrored_and_refracted(table, part, wave.d[:, met[some]])
+                both = mirrored_and_refracted(table, part, columns(wave.d, met[some]))
                 waves += [
                     self._spawn(wave, met[some], part, kind, direction, weight, np.full(len(some), math.inf))
                     for kind, (direction, weight) in zip((REFLECTED, REFRACTED), both)
@@ -345,18 +347,18 @@ class Whitted(Tracer):
 
     def _spawn(self, wave, met, surface, kind, direction, weight, t_max):
         """Rays from surfaces, those with no weight left out."""
-        weight = wave.weight[:, met] * weight
+        weight = columns(wave.weight, met) * weight
         which = np.flatnonzero((weight > 0.0).any(axis=0) & (t_max >= 0.0))
-        o = pushed(surface.point[:, which], surface.error[which], surface.normal[:, which], direction[:, which])
+        o = pushed(columns(surface.point, which), surface.error[which], columns(surface.normal, which), columns(direction, which))
         # A ray that gets no further would go on for ever.
-        moved = np.flatnonzero((o != wave.o[:, met[which]]).any(axis=0))
-        which, o = which[moved], o[:, moved]
-        weight = weight[:, which]
+        moved = np.flatnonzero((o != columns(wave.o, met[which])).any(axis=0))
+        which, o = which[moved], columns(o, moved)
+        weight = columns(weight, which)
         key = None if wave.key is None else sampling.branch(wave.key[met[which]], kind)
         if self.threshold:
             kept = self._worth(kind, weight, key)
             which, o, weight, key = which[kept], o[:, kept], weight[:, kept], None if key is None else key[kept]
-        return self._sent(wave, met[which], surface, which, kind, o, direction[:, which], t_max[which], weight, key)
+        return self._sent(wave, met[which], surface, which, kind, o, columns(direction, which), t_max[which], weight, key)
 
     def _sent(self, wave, ray, surface, which, kind, o, direction, t_max, weight, key):
         """The wave of what goes on from the surfaces `which`, which the rays `ray` of a wave met."""
@@ -369,7 +371,7 @@ class Whitted(Tracer):
             wave.depth[ray] + (kind != TRANSPARENT),
             np.full(len(ray), kind, np.uint8),
             key,
-            surface.place[:, which],
+            columns(surface.place, which),
         )
 
     def _worth(self, kind, weight, key):
