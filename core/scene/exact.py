@@ -2,6 +2,8 @@
 
 import math
 
+from ..vectors import cross, dot, minus
+
 #: Edge functions whose sum is smaller than this part of the products that they consist of are calculated exactly: above,
 #: rounding moves a hit along the ray by 2^-53 / DOUBTFUL of the triangle's extent at most, and that only where it is seen
 #: edge-on, so that the hit is as little off its plane.
@@ -124,18 +126,6 @@ def collinear(a, b, c):
     whole = iter(_whole(*a, *b, *c))
     a, b, c = zip(whole, whole, whole)
     return not any(cross(minus(b, a), minus(c, a)))
-
-
-def minus(a, b):
-    return a[0] - b[0], a[1] - b[1], a[2] - b[2]
-
-
-def cross(a, b):
-    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
-
-
-def dot(a, b):
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
 def _whole(*numbers):

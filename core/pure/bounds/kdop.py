@@ -5,6 +5,7 @@ import itertools
 import math
 
 from ...hits import KDOP_AXES as AXES
+from ...vectors import dot
 from ..ray import EPSILON
 from . import Margin, Volume, margin_of
 
@@ -67,7 +68,7 @@ class KDop(Volume):
 
     def projected(self, direction):
         # Half of the faces are turned to the light; each one's shadow is smaller by the cosine.
-        return self._faces([0.5 * abs(_dot(n, direction)) / math.sqrt(_dot(n, n)) for n in _normals(2 * len(self.low))])
+        return self._faces([0.5 * abs(dot(n, direction)) / math.sqrt(dot(n, n)) for n in _normals(2 * len(self.low))])
 
     def _faces(self, weight):
         """The sum of the faces' areas by their weights.
@@ -82,7 +83,7 @@ class KDop(Volume):
         # Measured from the middle, or everything cancels far from the origin.
         middle = [0.5 * (l + h) for l, h in zip(self.low[:3], self.high[:3])]
         normals = _normals(2 * half)
-        d = [x - _dot(n, middle) for x, n in zip([-x for x in self.low] + list(self.high), normals)]
+        d = [x - dot(n, middle) for x, n in zip([-x for x in self.low] + list(self.high), normals)]
         tiny = COINCIDE * max(map(abs, d))
         area = 0.0
         for f, g, ff, gg, fg, ee, cuts in _lines(2 * half):
@@ -129,10 +130,6 @@ def _normals(k):
     return [tuple(-x for x in a) for a in AXES[k]] + AXES[k]
 
 
-def _dot(a, b):
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-
-
 @functools.cache
 def _lines(k):
     """The lines where two faces' planes meet: the faces, products of their normals, and what cuts the line."""
@@ -141,11 +138,11 @@ def _lines(k):
         a, b = normals[f], normals[g]
         e = (a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0])
         if any(e):
-            aa, bb, ab, cuts = _dot(a, a), _dot(b, b), _dot(a, b), []
+            aa, bb, ab, cuts = dot(a, a), dot(b, b), dot(a, b), []
             for h, n in enumerate(normals):
                 if h not in (f, g):
-                    ha, hb = _dot(n, a), _dot(n, b)
+                    ha, hb = dot(n, a), dot(n, b)
                     # The normal is between the two.
-                    cuts.append((h, ha, hb, _dot(n, e), ha * bb > hb * ab and hb * aa > ha * ab))
-            out.append((f, g, aa, bb, ab, _dot(e, e), cuts))
+                    cuts.append((h, ha, hb, dot(n, e), ha * bb > hb * ab and hb * aa > ha * ab))
+            out.append((f, g, aa, bb, ab, dot(e, e), cuts))
     return out

@@ -8,6 +8,7 @@ sphere grows with every such step, so the search ends.
 import itertools
 import math
 
+from ...vectors import dot
 from ..ray import EPSILON
 from . import Margin, Volume
 from .hull import balls
@@ -111,13 +112,13 @@ def _touching(d, r0, r):
     if not d:
         yield (0.0, 0.0, 0.0), r0
         return
-    inverse = _inverse([[_dot(a, b) for b in d] for a in d])
+    inverse = _inverse([[dot(a, b) for b in d] for a in d])
     if inverse is None:
         return
-    e = [0.5 * (_dot(a, a) + r0 * r0 - s * s) for a, s in zip(d, r)]
+    e = [0.5 * (dot(a, a) + r0 * r0 - s * s) for a, s in zip(d, r)]
     f = [s - r0 for s in r]
     u, v = (_combination(d, [sum(m * y for m, y in zip(row, right)) for row in inverse]) for right in (e, f))
-    a, b, c = _dot(v, v) - 1.0, _dot(u, v) + r0, _dot(u, u) - r0 * r0
+    a, b, c = dot(v, v) - 1.0, dot(u, v) + r0, dot(u, u) - r0 * r0
     if b * b - a * c < 0.0:
         return
     q = -(b + math.copysign(math.sqrt(b * b - a * c), b))
@@ -125,10 +126,6 @@ def _touching(d, r0, r):
         if lower:
             radius = upper / lower
             yield tuple(x + radius * y for x, y in zip(u, v)), radius
-
-
-def _dot(a, b):
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
 def _combination(vectors, weights):
@@ -145,5 +142,5 @@ def _inverse(m):
         return [[m[1][1] / det, -m[0][1] / det], [-m[1][0] / det, m[0][0] / det]] if det else None
     cofactor = [[m[(i + 1) % 3][(j + 1) % 3] * m[(i + 2) % 3][(j + 2) % 3] - m[(i + 1) % 3][(j + 2) % 3] * m[(i + 2) % 3][(j + 1) % 3]
                  for j in range(3)] for i in range(3)]
-    det = _dot(m[0], cofactor[0])
+    det = dot(m[0], cofactor[0])
     return [[x / det for x in row] for row in cofactor] if det else None

@@ -8,12 +8,13 @@ Rays that go to no light, to elsewhere than the centre of one that has an extent
 import math
 
 from ...errors import Notice
+from ...vectors import cross
 from ..query import Occluded
 from ..structure import Structure, memory_of
 from .cube import Cube
 from .quadtree import divide, divide_evenly, quads
 from .second import Handing
-from .view import LOSS, View, cross
+from .view import LOSS, View
 
 #: How far beside a light a ray may pass, or beyond it end, relative to the largest coordinate; well within the footprints' own rounding.
 BESIDE = 2.0**-46

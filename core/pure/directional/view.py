@@ -11,22 +11,14 @@ than what the views' arithmetic and the tests of primitives lose, and corners ar
 import itertools
 import math
 
+from ...vectors import cross, dot
+
 #: Rounding of the corners and of the rays, relative to the largest number involved.
 ROUNDING = 2.0**-42
 #: Nearness that is lost at most in comparisons, relative.
 LOSS = 2.0**-30
 #: Directions in the window in which corners of an inscribed box are looked for: they are the outline's corners.
 SIDES = 8
-
-
-def cross(a, b):
-    """The cross product."""
-    return (a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0])
-
-
-def dot(a, b):
-    """The dot product."""
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
 class View:

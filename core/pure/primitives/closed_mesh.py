@@ -3,8 +3,9 @@
 import copy
 import math
 
+from ...vectors import dot
 from . import box_common
-from .solids import EPSILON, dot
+from .solids import EPSILON
 from .triangle import Triangle, sized
 
 

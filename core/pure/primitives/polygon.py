@@ -8,8 +8,9 @@ one ends. What lies exactly on an edge is hit.
 import math
 
 from ...scene.solids import Corners
+from ...vectors import dot
 from . import Primitive
-from .solids import EPSILON, clamp, divide, dot
+from .solids import EPSILON, clamp, divide
 from .triangle import TRIM, Triangle, sized
 
 #: Heights at which an inscribed box is tried, and places in the widest stretch there.

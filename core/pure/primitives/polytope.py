@@ -2,8 +2,9 @@
 
 import math
 
+from ...vectors import dot
 from . import NOWHERE
-from .solids import DOUBT, EPSILON, UnitShape, dot
+from .solids import DOUBT, EPSILON, UnitShape
 
 
 class Polytope(UnitShape):

@@ -9,6 +9,7 @@ import math
 from importlib import import_module
 
 from ...scene.solids import place
+from ...vectors import dot
 from . import NOWHERE, Primitive, box_common, box_overlaps
 from .affine import unit
 
@@ -44,11 +45,6 @@ def solids_of(objects, which):
         module, name = MAKERS[kind]
         solids += getattr(import_module(f".{module}", __package__), name).all_of(placed)
     return solids
-
-
-def dot(a, b):
-    """The sum of products."""
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
 def divide(a, b):

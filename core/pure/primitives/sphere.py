@@ -2,8 +2,9 @@
 
 import math
 
+from ...vectors import dot
 from .affine import unit
-from .solids import DOUBT, EPSILON, UnitShape, clamp, divide, dot, root
+from .solids import DOUBT, EPSILON, UnitShape, clamp, divide, root
 
 
 class Sphere(UnitShape):

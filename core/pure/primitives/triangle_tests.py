@@ -7,7 +7,7 @@ that hits the front, its interval's two comparisons included; signs (negation, a
 
 import math
 
-from ...scene.exact import cross, dot, minus
+from ...vectors import cross, dot, minus
 from .triangle import Triangle
 
 
