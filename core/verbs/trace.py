@@ -46,10 +46,10 @@ def options(sub):
     sub.add_argument("--antialiasing", choices=("uniform", "corners", "variance"), default="uniform",
                      help="equally many samples in all pixels, or more where corners differ "
                      "or where the variance is high")
-    sub.add_argument("--aa-threshold", type=float, default=0.03,
+    sub.add_argument("--aa-threshold", type=float, default=0.02,
                      help="difference in displayed values, 0 to 1, that is put up with")
     sub.add_argument("--light-samples", type=int, default=1, help="shadow rays to each light that has an extent")
-    sub.add_argument("--aa-level", type=int, default=2, help="adaptive antialiasing: 4^level samples a pixel, at most")
+    sub.add_argument("--aa-level", type=int, default=3, help="adaptive antialiasing: 4^level samples a pixel, at most")
     sub.add_argument("--count", action="store_true", help="count tests and steps (slower)")
     sub.add_argument("--image", metavar="OUT.png", help="write the picture")
     sub.add_argument("--figures", metavar="OUT.json", help="write what it cost")
