@@ -10,7 +10,7 @@ from .. import inspection
 
 #: Rows and findings shown, at most.
 SHOWN = 12
-ICONS = {"far from the origin": "ORIENTATION_GLOBAL", "range of scale": "FULLSCREEN_ENTER", "zero scale": "EMPTY_AXIS", "slivers": "MESH_DATA",
+ICONS = {"far from the origin": "ORIENTATION_GLOBAL", "range of scale": "FULLSCREEN_ENTER", "zero scale": "EMPTY_AXIS", "slivers": "MESH_DATA", "no area": "MESH_DATA",
          "coincident surfaces": "MOD_SOLIDIFY"}
 
 

@@ -47,6 +47,61 @@ def test_building_warns(scene):
         assert all("Cube" in f.objects for f in warned)
 
 
+def triangles(name, vertices, faces):
+    mesh = bpy.data.meshes.new(name)
+    mesh.from_pydata(vertices, [], faces)
+    obj = bpy.data.objects.new(name, mesh)
+    bpy.context.scene.collection.objects.link(obj)
+    return obj
+
+
+def plant_far(cube):
+    cube.location.x = 1e7
+
+
+def plant_tiny(cube):
+    copy_of(cube, "Speck").scale = (1e-4,) * 3
+    cube.scale = (1e4,) * 3
+
+
+def plant_flat(cube):
+    cube.scale.y = 0.0
+
+
+def plant_double(cube):
+    copy_of(cube, "Twin")
+
+
+#: What is wrong -> how it gets into the scene, the objects that are named, what the text says of the result, and of the remedy.
+PLANTED = {
+    "far from the origin": (plant_far, {"Cube"}, "its surface is uneven", "Move the scene to the origin"),
+    "range of scale": (plant_tiny, {"Cube", "Speck"}, "rays that start on the large one may miss", "Scale one of them"),
+    "zero scale": (plant_flat, {"Cube"}, "0 along Y: it is flat or gone", "Clear > Scale"),
+    "slivers": (lambda cube: triangles("Needle", [(0, 0, 3), (1, 1, 3), (1, 1 + 1e-5, 3)], [(0, 1, 2)]), {"Needle"}, "their normals", "Degenerate Dissolve"),
+    "no area": (lambda cube: triangles("Line", [(0, 0, 3), (1, 0, 3), (2, 0, 3)], [(0, 1, 2)]), {"Line"}, "never hit", "Degenerate Dissolve"),
+    "coincident surfaces": (plant_double, {"Cube", "Twin"}, "which is seen depends on their order", "delete the doubled faces"),
+}
+
+
+@pytest.mark.parametrize("cause", PLANTED)
+def test_each_kind_of_warning_is_shown_and_selects_its_objects(scene, cause):
+    plant, names, result, remedy = PLANTED[cause]
+    bpy.ops.rayscope.build()
+    assert not inspection.warnings_of(scene)
+    plant(bpy.data.objects["Cube"])
+    bpy.context.view_layer.update()
+    bpy.ops.rayscope.build()
+    found = [f for f in inspection.warnings_of(scene) if f.cause == cause]
+    assert len(found) == 1 and set(found[0].objects) == names and result in found[0].text and remedy in found[0].remedy
+    assert {f.cause for f in inspection.warnings_of(scene)} == {cause}
+    sheet = Sheet()
+    findings.draw_finding(sheet, found[0], 40)
+    button, = [n for n in sheet.notes if not isinstance(n, str)]
+    assert bpy.ops.rayscope.select(names=button.names) == {"FINISHED"} and {o.name for o in bpy.context.selected_objects} == names
+    said = " ".join(n for n in sheet.notes if isinstance(n, str))
+    assert all(word in said for word in (cause.capitalize(), *result.split(), *remedy.split()))
+
+
 def test_select(scene):
     twin = copy_of(bpy.data.objects["Cube"], "Twin")
     twin.hide_set(True)

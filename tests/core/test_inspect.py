@@ -118,6 +118,17 @@ def test_poles_askew_are_no_overlap_and_one_finding():
     assert sorted(diagonal.objects) == [f"pole {k}" for k in range(6)] and diagonal.gain > 0.2 and "so with 5 others" in diagonal.text
 
 
+def test_instances_are_hidden_only_if_all_are(monkeypatch):
+    """They have one name: what is disabled in renders is gone everywhere."""
+    monkeypatch.setattr("rayscope.core.scene.layout.COPIES_AT_MOST", 10)
+    mesh, other = ball(8), ball(9)
+    trees = [placed("tree", mesh, (0, 40 * k, 0)) for k in range(-2, 3)]
+    away = [placed("bush", other, (9 * k, -90, 0)) for k in range(3)]
+    found = {(f.cause, *f.objects): f for f in inspecting.inspect(seen([*trees, *away])).findings}
+    assert set(found) == {("not reached", "bush")} and "3 instances" in found["not reached", "bush"].text
+    assert found["not reached", "bush"].memory == 250 * len(other)
+
+
 def test_instances_at_one_place_are_duplicates(monkeypatch):
     mesh = ball(8)
     monkeypatch.setattr("rayscope.core.scene.layout.COPIES_AT_MOST", 10)
@@ -171,11 +182,12 @@ def test_warnings():
     flat.matrix[2, :3] = 0.0
     flat.matrix[:3, 2] = 0.0
     needle = Mesh([(0, 0, 9), (1, 1, 9), (1, 1 + 1e-6, 9)], [(0, 1, 2)])
+    line = Mesh([(0, 0, 9), (1, 1, 10), (2, 2, 11), (0, 3, 9), (1, 3, 9), (0, 4, 10)], [(0, 1, 2), (3, 4, 5)])
     twice = Mesh(mesh.vertices + (0, 9, 0), np.concatenate([mesh.triangles, mesh.triangles[:5, [1, 2, 0]]]))
-    scene = Scene([placed("far", mesh, (0, 1e6, 0)), flat, Object("needle", needle), placed("speck", mesh, (0, 0, 5), 1e-4), placed("double", mesh, (0, 1e6, 0)),
+    scene = Scene([placed("far", mesh, (0, 1e6, 0)), flat, Object("needle", needle), Object("line", line), placed("speck", mesh, (0, 0, 5), 1e-4), placed("double", mesh, (0, 1e6, 0)),
                    Object("twice", twice), placed("good", ball(5, 7), (0, -5, 0))])
     found = {(f.cause, *f.objects): f for f in inspecting.warnings(scene)}
-    assert {("far from the origin", "far"), ("zero scale", "flat"), ("slivers", "needle"), ("coincident surfaces", "far", "double"),
+    assert {("far from the origin", "far"), ("zero scale", "flat"), ("no area", "line"), ("slivers", "needle"), ("coincident surfaces", "far", "double"),
             ("coincident surfaces", "twice")} <= set(found)
     assert found["coincident surfaces", "twice"].number == 5 and found["coincident surfaces", "far", "double"].number == len(mesh)
     assert not any("good" in key for key in found)

@@ -14,6 +14,8 @@ from .shapes import area_of, box_of, shapes_of
 
 #: A triangle is a sliver when its longest side is so many times its height.
 SLIVER = 100.0
+#: Slivers on which less of the tests are made cost nothing.
+LEAST_SHARE = 0.005
 #: Bytes that a triangle takes in mesh and structure, about.
 TRIANGLE_BYTES = 250
 #: Copies that take less are no finding: bytes.
@@ -25,17 +27,25 @@ FILLED = 0.25
 
 
 def unreached(scene, ledger, corners, unseen, **_):
-    """Objects that no ray comes near, and objects that hide within others: tested against, but never met."""
+    """Objects that no ray comes near, and objects that hide in or behind others; of instances, which have one name, none may be seen."""
     again = {k for group in at_one_place(scene, corners) for k in group[1:]}       # hidden by what they are duplicates of
-    for k in (k for k in unseen if k not in again):
-        o = scene.objects[k]
-        many, remedy = len(o.geometry), "Disable it in renders (camera icon in the Outliner), or delete it."
-        if ledger.tests[k]:
-            yield Finding([o.name], "hidden", f"{ledger.tests[k]:,.0f} tests were made on it, but none of {ledger.rays:,} rays met it, nor one aimed at it: it hides in "
-                          "or behind others", remedy, float(ledger.tests[k]), memory=many * TRIANGLE_BYTES, same=True, apply=without(k))
-        else:
-            yield Finding([o.name], "not reached", f"none of {ledger.rays:,} rays was tested against it, but its {many:,} primitives are built in",
-                          remedy, many, memory=many * TRIANGLE_BYTES, same=True, apply=without(k))
+    named = {}
+    for k, o in enumerate(scene.objects):
+        if len(o.geometry):
+            named.setdefault(o.name, []).append(k)
+    kept = {id(o.geometry) for k, o in enumerate(scene.objects) if k not in unseen}
+    for name, numbers in named.items():
+        if not set(numbers) <= unseen - again:
+            continue
+        # Copies take memory each, instances share what others may still need.
+        parts = {id(scene.objects[k].geometry) if not len(corners[k]) else k: len(scene.objects[k].geometry) for k in numbers
+                 if len(corners[k]) or id(scene.objects[k].geometry) not in kept}
+        tests, blocks, many = float(ledger.tests[numbers].sum()), ledger.blocks[numbers].any(), sum(len(scene.objects[k].geometry) for k in numbers)
+        more = f" ({len(numbers)} instances)" if len(numbers) > 1 else ""
+        text = (f"{tests:,.0f} tests were made on it{more}, but none of {ledger.rays:,} rays met it, nor one aimed at it: it hides in or behind others" if tests else
+                f"none of {ledger.rays:,} rays was tested against it{more}, but its {many:,} primitives are built in")
+        yield Finding([name], "hidden" if tests else "not reached", text, "Disable it in renders (camera icon in the Outliner), or delete it.",
+                      tests or float(many), memory=sum(parts.values()) * TRIANGLE_BYTES, same=bool(blocks), apply=without(*numbers))
 
 
 def duplicates(scene, ledger, corners, **_):
@@ -93,6 +103,8 @@ def slivers(scene, ledger, corners, tests, **_):
         thin = height * SLIVER < longest
         if thin.sum() >= max(4, 0.02 * len(own)):
             share = tests[k][thin].sum() / max(sum(map(np.sum, tests)), 1.0) if len(tests[k]) == len(own) else 0.0
+            if share < LEAST_SHARE:
+                continue
             flat = height * 1e6 <= longest
             yield Finding([scene.objects[k].name], "slivers", f"{thin.sum():,} of {len(own):,} triangles are more than {SLIVER:g} times as long as high; {share:.1%} "
                           "of all tests are made on them", "Edit Mode > Mesh > Clean Up > Degenerate Dissolve, then Remesh, or Triangulate with Beauty.",

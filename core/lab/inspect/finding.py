@@ -23,7 +23,7 @@ class Finding:
     memory : float
         Bytes saved, about.
     same : bool
-        Whether the picture has to be the same with the remedy.
+        It is a finding only if the picture is the same with the remedy: what it concerns stopped shadow rays that others stop, too.
     """
 
     objects: list

@@ -94,7 +94,7 @@ def inspect(scene, technique="bvh", size=(640, 480), depth=5, checked=CHECKED, p
     tests = [ledger.of_primitive[ledger.object_of == k] for k in range(len(scene.objects))]
     never = never_met(scene, ledger)
     seen = in_sight(scene, ledger, never)
-    unseen = [k for k in never if k not in seen]
+    unseen = set(never) - seen
     given = dict(corners=corners, tests=tests, total=total, technique=technique, size=size, unseen=unseen)
     findings = list(together(merged(f for cause in CAUSES for f in cause(scene, ledger, **given))))
 
@@ -110,10 +110,9 @@ def inspect(scene, technique="bvh", size=(640, 480), depth=5, checked=CHECKED, p
         if changed.n_primitives:
             _, again = measured(changed, other, pixels, k + 2, parameters if other == technique else None)
             finding.gain = 1.0 - work_of(again) / max(work, 1)
-            if finding.same and not np.allclose(again.image, result.image, rtol=1e-4, atol=1e-6):
-                findings.remove(finding)                                # it matters after all
-    # What was tried and gains nothing is no finding.
-    findings = [f for f in findings if f.gain is None or f.gain >= LEAST_GAIN or f.memory]
+            finding.same = finding.same and not np.allclose(again.image, result.image, rtol=1e-4, atol=1e-6)
+    # What was tried and gains nothing is no finding; nor is what shades something, or may.
+    findings = [f for f in findings if not f.same and (f.gain is None or f.gain >= LEAST_GAIN or f.memory)]
     findings.sort(key=lambda f: (-(f.gain if f.gain is not None else 0.0), -f.memory))
     return Inspection(by_object(scene, ledger), findings, work, ledger.rays)
 

@@ -44,10 +44,14 @@ def warnings(scene):
                                  "Object > Clear > Scale (Alt S), or delete it.", float((scale == 0.0).sum())))
         if len(corners[k]):
             longest, height = shapes_of(corners[k])
-            thin = int((height * 1e4 < longest).sum())
+            thin, flat = int((height * 1e4 < longest).sum()), int(((height * 2.0**50 < longest) | (longest == 0.0)).sum())
+            if flat and scale.all():
+                found.append(Finding([o.name], "no area", f"{flat:,} of {len(corners[k]):,} triangles have no area: they are never hit, and only take time and memory",
+                                     "Edit Mode > Mesh > Clean Up > Degenerate Dissolve, or Merge > By Distance.", flat))
+            thin -= int(((height * 2.0**50 < longest)).sum())
             if thin:
                 found.append(Finding([o.name], "slivers", f"{thin:,} of {len(corners[k]):,} triangles are more than 10,000 times as long as high: their normals and the place of hits "
-                                     "along them are poor; those without any area are never hit", "Edit Mode > Mesh > Clean Up > Degenerate Dissolve.", thin))
+                                     "along them are poor", "Edit Mode > Mesh > Clean Up > Degenerate Dissolve.", thin))
     for some, number in sorted(_coincident(corners).items(), key=lambda item: -item[1]):
         found.append(Finding([scene.objects[k].name for k in some], "coincident surfaces", f"{number:,} triangles lie exactly on one another"
                              + (" within the object" if len(some) == 1 else "") + ": which is seen depends on their order alone; glass and shadows may flicker",

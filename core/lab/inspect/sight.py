@@ -10,8 +10,8 @@ EACH, ALL = 64, 20_000
 
 
 def never_met(scene, ledger):
-    """Numbers of the objects that no ray met, and that shaded none."""
-    return [k for k, o in enumerate(scene.objects) if len(o.geometry) and not ledger.hits[k] and not ledger.blocks[k]]
+    """Numbers of the objects that were the first thing met by no ray; shadow rays may have been stopped by them."""
+    return [k for k, o in enumerate(scene.objects) if len(o.geometry) and not ledger.hits[k]]
 
 
 def in_sight(scene, ledger, numbers):
