@@ -5,7 +5,7 @@ from pathlib import Path
 
 from ..arguments import DEFAULT_SIDE, picture_size, proportional, seed, whole
 from ..errors import MissingPackageError, ParameterError
-from ..lab import against_brute, antialiasing, automatic, bench, directional, division, generalised, report
+from ..lab import against_brute, antialiasing, automatic, bench, directional, division, generalised, report, resolutions
 from ..outcome import DONE, FAILED, Outcome, say
 from ..scene.files import read_file
 
@@ -25,6 +25,8 @@ def options(sub):
     sub.add_argument("--directional", action="store_true",
                      help="instead: what directional techniques gain, for rays of the camera, rays to a "
                      "light, and the picture of the interior among the examples")
+    sub.add_argument("--out", metavar="DIR",
+                     help="with --directional: also what the resolution of direction cubes does to tests per ray and lists, as a table and a plot there")
     sub.add_argument("--automatic", action="store_true",
                      help="instead: the automatic choice of techniques against each fixed one, on the "
                      "procedural databases and the examples")
@@ -106,8 +108,25 @@ def _directional(call):
     rooms = ((room, size) for room in _examples(call, size, "interior.blend"))
     result = directional.directional(call.subdivisions, rooms, call.repeats, call.seed, say=say)
     asked = {"directional": True, "subdivisions": call.subdivisions, "repeats": call.repeats}
+    text = directional.text(result)
+    if call.out:
+        result["resolutions"], more = _resolutions(call)
+        text += more
     record = report.record("bench", None, call.seed, asked, **result)
-    return Outcome(directional.text(result), record, DONE if result["met"] else FAILED)
+    return Outcome(text, record, DONE if result["met"] else FAILED)
+
+
+def _resolutions(call):
+    """Rows, and the table with the file's name; writes the plot."""
+    scene = resolutions.figure_scene(bench.monkey_scene(min(call.subdivisions, 1))[0])
+    rows = resolutions.resolutions(scene, seed=call.seed, say=say)
+    path = report.folder(call.out) / "resolutions.png"
+    try:
+        resolutions.plot(path, rows, scene.name)
+        told = f"written: {path}"
+    except MissingPackageError as error:
+        told = str(error)
+    return rows, f"\n\n{scene.name}\n{resolutions.text(rows)}\n\n{told}"
 
 
 def _division(call):
