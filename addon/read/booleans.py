@@ -6,7 +6,7 @@ the mesh that Blender evaluates is used instead, so that the picture is complete
 
 import numpy as np
 
-from ...core.scene import solids
+from ...core.scene import csg, placed, solids
 from ...core.scene.scene import Object, Shapes
 from .meshes import read_mesh
 from .primitives import kind_of, unit_solid
@@ -68,7 +68,7 @@ class Booleans:
         solid = self._solid(obj, obj, slots, None, (), whole=True)
         world = self._matrix(obj)
         # The core's own check; as it stands in the world, where it will be traced.
-        if fault := solids.Tree.of([Object(obj.name, Shapes([solid]), world)], 0, 0, solid).fault():
+        if fault := placed.Tree.of([Object(obj.name, Shapes([solid]), world)], 0, 0, solid).fault():
             raise _Refused(fault + ".")
         self._note_smooth(obj, solid)
         return Shapes([solid], obj.name), tuple(slots.reads)
@@ -169,7 +169,7 @@ class Booleans:
         middle = mesh.vertices.mean(axis=0) if len(mesh) else 0.0
         if np.einsum(
             "ij,ij->", corners[:, 0] - middle, np.cross(corners[:, 1] - middle, corners[:, 2] - middle)
-        ) < 0.0 and not solids.mesh_fault(mesh):
+        ) < 0.0 and not csg.mesh_fault(mesh):
             raise _Refused(f"{evaluated.name} is inside out; turn its faces with Mesh > Normals > Recalculate Outside.")
         return solids.mesh(mesh, matrix, slot=used[0], name=evaluated.name)
 
@@ -198,7 +198,7 @@ class Booleans:
         smooth = sorted(
             {
                 leaf.name
-                for leaf in solids.flatten(solid)[1]
+                for leaf in csg.flatten(solid)[1]
                 if leaf.kind == "mesh" and leaf.values["mesh"].corner_normals is not None
             }
         )

@@ -11,7 +11,8 @@ import numpy as np
 
 from .ears import area, ears, flattened, turn
 from .layout import Layout, mirrors, to_world
-from .solids import Corners, bounds, place
+from .placed import Corners, place
+from .solids import bounds
 
 #: Corners of a face, at most.
 CORNERS = 8

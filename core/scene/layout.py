@@ -110,8 +110,9 @@ def _local_corners(geometry):
         points = geometry.vertices[referenced]
         lo, hi = points.min(axis=0), points.max(axis=0)
     else:
+        from .placed import faults
         from .scene import Object
-        from .solids import bounds, faults
+        from .solids import bounds
         bad = {k for _, k, _ in faults([Object("", geometry)])}
         boxes = [bounds(s) for k, s in enumerate(geometry.solids) if k not in bad]
         if not boxes:

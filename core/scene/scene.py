@@ -162,7 +162,7 @@ class Scene:
                                            f"{MAX_COORDINATE:g}; they were left out. Find the modifier that makes them, or use Mesh > Clean Up."))
 
         if any(isinstance(o.geometry, Shapes) for o in self.objects):
-            from .solids import faults
+            from .placed import faults
             for i, k, text in faults(self.objects):
                 solid = self.objects[i].geometry.solids[k]
                 self.notices.append(Notice(f"{self.objects[i].name}: {solid.name or f'solid {k}'}", f"{text}; it was left out."))

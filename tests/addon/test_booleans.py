@@ -8,7 +8,7 @@ from bl_ext.user_default.rayscope.addon.read import read_scene
 from bl_ext.user_default.rayscope.core import build
 from bl_ext.user_default.rayscope.core.scene.camera import Camera
 from bl_ext.user_default.rayscope.core.scene.scene import Mesh
-from bl_ext.user_default.rayscope.core.scene.solids import flatten
+from bl_ext.user_default.rayscope.core.scene.csg import flatten
 
 SIZE = 160
 

@@ -12,7 +12,7 @@ from bl_ext.user_default.rayscope.addon.read import read_scene
 from bl_ext.user_default.rayscope.core import trace
 from bl_ext.user_default.rayscope.core.scene.layout import object_bounds
 from bl_ext.user_default.rayscope.core.scene.scene import Shapes
-from bl_ext.user_default.rayscope.core.scene.solids import flatten
+from bl_ext.user_default.rayscope.core.scene.csg import flatten
 
 FOLDER = Path(__file__).resolve().parents[2] / "example_blends"
 NAMES = ("still_life", "forest", "teapot_in_a_stadium", "interior", "csg")

@@ -13,7 +13,7 @@ from importlib import import_module
 import numpy as np
 
 from ...scene.csg import DIFFERENCE, INTERSECTION, OPERATIONS, UNION, s_bounds
-from ...scene.solids import Placed
+from ...scene.placed import Placed
 from ..bounds import between, meets
 from .closed_mesh import ClosedMesh
 from .solids import CLASSES

@@ -10,7 +10,7 @@ near to an edge that rounding matters are decided by the full test, so both give
 
 import numpy as np
 
-from ...scene.solids import Corners
+from ...scene.placed import Corners
 from .solids import EPSILON, dot
 from .triangle import TRIM, Triangles
 

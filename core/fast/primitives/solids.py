@@ -9,7 +9,7 @@ from importlib import import_module
 
 import numpy as np
 
-from ...scene.solids import place
+from ...scene.placed import place
 
 EPSILON = 2.0**-52
 #: Steps after which two shapes not yet proved to be apart count as touching.

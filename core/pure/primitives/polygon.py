@@ -7,7 +7,7 @@ one ends. What lies exactly on an edge is hit.
 
 import math
 
-from ...scene.solids import Corners
+from ...scene.placed import Corners
 from ...vectors import dot
 from . import Primitive
 from .solids import EPSILON, clamp, divide

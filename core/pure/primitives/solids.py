@@ -8,7 +8,7 @@ else is the same for every kind and stands here.
 import math
 from importlib import import_module
 
-from ...scene.solids import place
+from ...scene.placed import place
 from ...vectors import dot
 from . import NOWHERE, Primitive, box_common, box_overlaps
 from .affine import unit
