@@ -245,7 +245,9 @@ def test_float32_is_an_error_of_its_own():
 
 
 def test_too_little_time_gives_fewer_points_and_none_that_are_wrong():
-    little = lab.error_time(room(), (16, 12), seconds=0.01)
+    said = []
+    little = lab.error_time(room(), (16, 12), seconds=0.01, say=said.append)
+    assert any("settings are the least there is" in line for line in said)
     assert little["rows"] and little["reference"]["samples"] >= 16 * 2
     assert any("samples" in line for line in little["left_out"])
     for row in little["rows"]:
