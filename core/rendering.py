@@ -163,7 +163,7 @@ class Rendering:
         and more where their variance is high. Both adaptive ways sample lights that have an extent. Default uniform.
     aa_threshold : float
         Difference in displayed values, 0 to 1, that is put up with: between the corners; as the standard error of a
-        pixel with 4 samples, n / 4 of it with n, so that samples go where they take most from the error. Default 0.02.
+        pixel with 4 samples, n / 4 of it with n, so that samples go where they take most from the error. Default 0.025.
     aa_level : int
         4**aa_level samples a pixel, at most; corners are divided `aa_level` times. Default 3.
     light_samples : int

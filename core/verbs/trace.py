@@ -46,7 +46,7 @@ def options(sub):
     sub.add_argument("--antialiasing", choices=("uniform", "corners", "variance"), default="uniform",
                      help="equally many samples in all pixels, or more where corners differ "
                      "or where the variance is high")
-    sub.add_argument("--aa-threshold", type=float, default=0.02,
+    sub.add_argument("--aa-threshold", type=float, default=0.025,
                      help="difference in displayed values, 0 to 1, that is put up with")
     sub.add_argument("--light-samples", type=int, default=1, help="shadow rays to each light that has an extent")
     sub.add_argument("--aa-level", type=int, default=3, help="adaptive antialiasing: 4^level samples a pixel, at most")
