@@ -7,6 +7,8 @@ from .ears import area, ears, flattened, turn
 SMALL = 0.25
 #: Cones are sampled that are worth no more rays than these, those to lights and others: a cone costs some ten rays.
 SHADOW_RAYS, RAYS = 4.0, 1.0
+#: Points of a cone at which a texture is looked up.
+TEXELS = 16
 #: Cones that reach more primitives than this are sampled, which is less work.
 MANY = 96
 #: The triangles' areas add up to the polygon's but for so much of it, or the polygon crosses itself.

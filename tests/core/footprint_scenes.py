@@ -1,11 +1,13 @@
 """Scenes for techniques that trace pixels as a whole."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 
 from rayscope.core import Camera, Light, Material, Mesh, Object, Scene, solids
 from rayscope.core.lab.rooms import ball_on_floor, lamp, panel
+from rayscope.core.scene.material import Image
 
 
 def lit(*more, radius=0.4, mirror=0.7, lights=None, wall=None):
@@ -46,6 +48,22 @@ def with_mesh():
     scene = lit(wall=Material("wall", base=(0.9, 0.5, 0.3), alpha=0.5))
     scene.objects[2] = Object("ball", ball_mesh(6, 10, smooth=True), materials=(Material("shiny", mirror=0.5),))
     scene.camera = Camera(scene.camera.matrix, (-3, 3, -2.25, 2.25), "orthographic")
+    return scene
+
+
+def with_texture():
+    """The same on a checkered floor, much finer than pixels where it is far away; a wall with holes mirrors."""
+    checks = np.ones((2, 2, 4))
+    checks[[0, 1], [0, 1], :3] = 0.05
+    floor = Material("checks", texture=Image("checks", checks, "closest", mapping=np.array([[6, 0, 0], [0, 6, 0]])))
+    checks = checks.copy()
+    checks[0, 1, 3] = 0.0
+    holes = Material("holes", texture=Image("holes", checks, "closest", mapping=np.array([[4, 0, 0], [0, 4, 0]])), texture_alpha=True,
+                     mirror=0.5)
+    scene, uvs = lit(), np.array([[(0, 0), (1, 0), (0, 1)]], np.float32)
+    for k, material in enumerate((floor, holes)):
+        own = scene.objects[k]
+        scene.objects[k] = Object(own.name, replace(own.geometry, corner_uvs=uvs), materials=(material,))
     return scene
 
 

@@ -13,13 +13,13 @@ from rayscope.core.fast.generalised.cone import Cones, Reach
 from rayscope.core.fast.generalised.outlines import points
 from rayscope.core.fast.generalised.cones_tracer import scattering
 
-from .footprint_scenes import ball_mesh, displayed, lit, rmse, with_area, with_cylinder, with_glass, with_mesh
+from .footprint_scenes import ball_mesh, displayed, lit, rmse, with_area, with_cylinder, with_glass, with_mesh, with_texture
 
 pytestmark = pytest.mark.slow
 
 SCENES = {
     "ball": lit, "rectangle": lambda: with_area("rectangle"), "ellipse": lambda: with_area("ellipse"),
-    "glass": with_glass, "mesh": with_mesh, "cylinder": with_cylinder,
+    "glass": with_glass, "mesh": with_mesh, "cylinder": with_cylinder, "texture": with_texture,
 }
 
 

@@ -8,7 +8,7 @@ import pytest
 from rayscope.core import Camera, Material, Mesh, Object, Scene, World, solids, trace
 from rayscope.core.rendering import Rendering
 
-from .footprint_scenes import ball_mesh, lit, rmse, with_area, with_cylinder, with_mesh
+from .footprint_scenes import ball_mesh, lit, rmse, with_area, with_cylinder, with_mesh, with_texture
 
 pytestmark = pytest.mark.slow
 
@@ -77,7 +77,7 @@ def test_crossing_polygons_hide_each_other_in_part(core, kind):
         assert np.abs(got[..., 0] - red).max() < 1e-11 and np.abs(got.sum(axis=-1) - 1.0).max() < 1e-11
 
 
-@pytest.mark.parametrize("make", [lit, with_mesh, with_cylinder])
+@pytest.mark.parametrize("make", [lit, with_mesh, with_cylinder, with_texture])
 def test_both_cores_alike(make):
     fast, pure = (trace(make(), "pyramids", core, (8, 6), 1, light_samples=2, seed=3) for core in ("fast", "pure"))
     assert np.abs(fast.image - pure.image).max() < 1e-6
@@ -85,7 +85,7 @@ def test_both_cores_alike(make):
     assert [str(n) for n in fast.notices] == [str(n) for n in pure.notices]
 
 
-@pytest.mark.parametrize("make", [with_mesh, with_cylinder])
+@pytest.mark.parametrize("make", [with_mesh, with_cylinder, with_texture])
 def test_less_error_than_4_samples(make):
     size = (24, 18)
     scene = make()

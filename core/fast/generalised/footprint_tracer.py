@@ -202,6 +202,13 @@ class FootprintTracer(Whitted):
         fields = {"t": rays.callers_t(t, pair), "u": u, "v": v} | hits
         return found, {name: fields[name] for name in _misses(0)}
 
+    def _shade(self, wave, hits, met, surface):
+        if self.surfaces.table.textures and isinstance(wave, ConeWave):
+            from .footprint_texture import blur
+
+            blur(self.surfaces, self.probe["primary"].structure.pieces, wave, met, surface, hits.u[met], hits.v[met])
+        super()._shade(wave, hits, met, surface)
+
     def _count_cones(self, wave, which, hit, n_it, n_ts):
         """Add cones to the tally."""
         for kind in np.unique(wave.kind[which]):

@@ -188,7 +188,7 @@ class Surfaces:
         normal = np.ascontiguousarray(hits.normal[which].T)
         outside = dot(d, normal) <= 0.0
         normal *= np.where(outside, 1.0, -1.0)
-        base, alpha = self._colour(material, obj, primitive, u, v)
+        base, alpha = self.colour(material, obj, primitive, u, v)
         return Surface(
             np.ascontiguousarray(hits.point[which].T),
             hits.error[which],
@@ -206,7 +206,11 @@ class Surfaces:
         slot = 0 if self._slots is None else np.minimum(self._slots.at(obj, primitive, part), self._palette_last[obj])
         return self._palette[self._palette_start[obj] + slot]
 
-    def _colour(self, material, obj, primitive, u, v):
+    def textured(self, material, obj):
+        """Which hits are on meshes with a texture; for scenes that have any."""
+        return self._mesh[obj] & np.any([users[material] for _, users in self.table.textures], axis=0)
+
+    def colour(self, material, obj, primitive, u, v):
         """Base colour and alpha."""
         table = self.table
         base, alpha = columns(table.base, material), table.alpha[material]

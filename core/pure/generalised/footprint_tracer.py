@@ -20,6 +20,7 @@ from ..tracing.camera import through
 from ..tracing.vectors import minus, times
 from ..tracing.whitted import KINDS, PRIMARY, Path, Whitted
 from .cone import Cone
+from .footprint_texture import blurred
 from .footprints import FootprintTree
 from .outlines import scattered
 
@@ -116,7 +117,8 @@ class FootprintTracer(Whitted):
             if hit is not None:
                 own = path.narrowed(s, t, share, rank)
                 own.item, own.hit = outline.item, hit
-                parts.append((own, hit, self.surfaces.at(hit, own.d)))
+                surface = self.surfaces.at(hit, own.d)
+                parts.append((own, hit, blurred(self.surfaces, own.cone, structure.primitives[outline.item], hit, surface)))
                 left -= share
         self._count_cone(path.kind, bool(parts), n_it, n_ts)
         if left > LEFT:

@@ -56,7 +56,7 @@ class Surfaces:
         material = self._material(obj, hit)
         outside = dot(d, hit.normal) <= 0.0
         normal = hit.normal if outside else times(-1.0, hit.normal)
-        base, alpha = self._colour(material, obj.geometry, hit)
+        base, alpha = self.colour(material, obj.geometry, hit)
         shading = self.smooth(normal, hit)
         return Surface(hit.point, hit.error, normal, shading, outside, material, base, alpha, (hit.object, hit.primitive))
 
@@ -72,7 +72,7 @@ class Surfaces:
             slot = 0 if geometry.slots is None else int(geometry.slots[hit.primitive])
         return materials[max(min(slot, len(materials) - 1), 0)]
 
-    def _colour(self, material, geometry, hit):
+    def colour(self, material, geometry, hit):
         """Base colour and alpha."""
         base, alpha = tuple(map(float, material.base[:3])), material.alpha
         if material.texture is not None:
