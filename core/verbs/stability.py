@@ -6,6 +6,7 @@ from ..arguments import seed, whole
 from ..catalogue import technique
 from ..errors import ParameterError
 from ..lab import report, stability
+from ..lab.stability.trial import variant_text
 from ..outcome import DONE, FAILED, Outcome, say
 
 
@@ -24,7 +25,6 @@ def options(sub):
 
 def run(call):
     if call.replay:
-        result = stability.replay(call.replay, say=say)
         return _replayed(call.replay, stability.replay(call.replay, say=say))
     names = call.techniques.split(",") if call.techniques else None
     for name in names or ():
@@ -51,9 +51,9 @@ def run(call):
 
 def _replayed(path, result):
     row = result["row"]
-    text = [*(f"ray {r['number']}: brute force {r['brute']}, found {r['found']}, exact t {r['exact']}"
+    text = [*(f"ray {r['number']}: brute force {r['brute']}, found {r['found']}, as a shadow ray {'blocked' if r['blocked'] else 'free'}, exact t {r['exact']}"
               for r in result["rays"]),
-            f"{row['case']}: {row['technique']} ({row['core']}) against brute force: {row['verdict']}",
+            f"{row['case']}: {variant_text(row['technique'], row.get('parameters', {}))} ({row['core']}) against brute force: {row['verdict']}",
             f"brute force against exact arithmetic: {result['truth']['verdict']}"]
     record = report.record("stability", parameters={"replay": path}, **result)
     return Outcome("\n".join(text), record, FAILED if result["failed"] else DONE)

@@ -58,8 +58,8 @@ def replay(path, say=lambda line: None):
     Returns
     -------
     dict
-        rays : list of dict with `number`, `brute` and `found` (t and primitive of each), `exact` t where the case has
-        one; row : the case's row as it is now; failed : bool.
+        rays : list of dict with `number`, `brute` and `found` (t and primitive of each), `blocked` as a shadow ray, `exact` t where
+        the case has one; row : the case's row as it is now; failed : bool.
 
     Raises
     ------
@@ -88,9 +88,10 @@ def replay(path, say=lambda line: None):
         leaving = np.array(ray["leaving"])[:, None] if "leaving" in ray else None
         one = Batch(*(np.array([x]) for x in numbers), must=batch.must, leaving=leaving)
         expected, got = asked(one, brute), asked(one, index)
+        blocked = bool(index.occluded(one.o, one.d, t_min=one.t_min, t_max=one.t_max)[0])
         true = exact.nearest(*numbers[:2], lists, *numbers[2:]) if case.exact and lists and leaving is None and np.isfinite(one.o).all() else None
         lines.append({"number": ray["number"], "brute": (float(expected.t[0]), int(expected.primitive[0])),
-                      "found": (float(got.t[0]), int(got.primitive[0])), "exact": float(true[0]) if true else None})
+                      "found": (float(got.t[0]), int(got.primitive[0])), "blocked": blocked, "exact": float(true[0]) if true else None})
     friendly = next(c for c in cases(full) if c.name == "friendly")
     scene_f, batch_f, right_f = given(friendly, seed, full)
     base = examine(friendly, scene_f, batch_f, right_f, name, core, seed)
