@@ -11,7 +11,7 @@ import math
 from ...cell_shapes import plane_pieces
 from ...cells import DIRECTIONS, bsp_notice, depth_for
 from ..primitives.solids import divide as quotient
-from .lists import Visits
+from .lists import Visits, walked
 from .tree import CellTree, Node
 
 #: Planes of polygons that are tried in a cell.
@@ -113,13 +113,8 @@ class BspTree(CellTree):
     def walk(self, query):
         """Depth first, nearer parts first."""
         ray, root = query.ray, self.nodes[0]
-        inside = ray.through_box(root.lo, root.hi, query.t)
+        inside = walked(query, root.lo, root.hi, self.margin)
         if inside is None:
-            return
-        if ray.slack > 0.5 * self.margin:
-            # The ray comes from so far away that its own rounding errors are as large as the band around a plane.
-            for item in range(len(self.primitives)):
-                query.test(item)
             return
         visits, stack = Visits(self, query), [(root, *inside)]
         while stack:

@@ -13,7 +13,7 @@ from ...hits import Cells
 from ...memory import free_memory
 from ..ray import EPSILON
 from ..structure import Structure, memory_of
-from .lists import Visits, shared
+from .lists import Visits, shared, walked
 
 #: Bytes a cell takes: a reference to its list, and, in some cells, the list.
 CELL_BYTES = 32
@@ -135,13 +135,8 @@ class Grid(Structure):
         hit lies before the current cell's exit.
         """
         ray, how = query.ray, self.parameters.get("walk", "exact")
-        inside = ray.through_box(self.lo, self.hi, query.t)
+        inside = walked(query, self.lo, self.hi, self.margin)
         if inside is None:
-            return
-        if ray.slack > 0.5 * self.margin:
-            # The ray comes from so far away that its own rounding errors are as large as cells overlap.
-            for item in range(len(self.primitives)):
-                query.test(item)
             return
         t_in = inside[0]
         entry = [o + t_in * d for o, d in zip(ray.o, ray.d)]

@@ -1,10 +1,24 @@
-"""What a ray does in the cells that it walks through: tests, mailboxes, marks on shared lists."""
+"""What a ray does in the cells that it walks through: where it is among them, tests, mailboxes, marks on shared lists."""
 
 
 def shared(lists):
     """The same lists of primitives, those that are alike being one and the same object."""
     known = {}
     return [known.setdefault(tuple(items), tuple(items)) for items in lists]
+
+
+def walked(query, lo, hi, margin):
+    """Where a ray is in the box that is divided into cells, or None where there is nothing to walk through.
+
+    A ray from so far away that its own rounding errors are as large as the `margin` by which cells overlap is not
+    walked: all primitives are tested.
+    """
+    inside = query.ray.through_box(lo, hi, query.t)
+    if inside is not None and query.ray.slack > 0.5 * margin:
+        for item in range(len(query.primitives)):
+            query.test(item)
+        return None
+    return inside
 
 
 class Visits:

@@ -15,7 +15,7 @@ from ...cells import REFERENCES_AT_LEAST, REFERENCES_PER_PRIMITIVE, TREE_OVERLAP
 from ...hits import Cells
 from ..ray import EPSILON
 from ..structure import Structure
-from .lists import Visits, shared
+from .lists import Visits, shared, walked
 
 #: Divisions that do not pay, allowed on the way to a leaf (Havran 2001; Pharr et al.).
 BAD_AT_MOST = 1
@@ -201,13 +201,8 @@ class CellTree(Structure):
 
     def walk(self, query):
         ray, root = query.ray, self.nodes[0]
-        inside = ray.through_box(root.lo, root.hi, query.t)
+        inside = walked(query, root.lo, root.hi, self.margin)
         if inside is None:
-            return
-        if ray.slack > 0.5 * self.margin:
-            # The ray comes from so far away that its own rounding errors are as large as cells overlap.
-            for item in range(len(self.primitives)):
-                query.test(item)
             return
         t_in = inside[0]
         # Not before the entry, where a ray only grazes the root.
