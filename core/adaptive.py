@@ -3,6 +3,8 @@
 What is judged are displayed values: 0 to 1, brighter than white is white, with a gamma of 2.
 """
 
+import math
+
 #: Corners whose depths differ by more than this ratio belong to different surfaces.
 DEPTHS = 1.1
 #: Samples of a pixel before its error is judged, at least.
@@ -65,7 +67,7 @@ class ByVariance(Adaptive):
     displayed, is above threshold * n / FIRST * sqrt(rays of a sample there / rays of a sample on average), and three
     times as many if it is so far above that twice the samples would not do. Then a ray more takes about as much from
     the picture's squared error everywhere (Neyman's allocation, 1934; stratified samples err less, the more they are,
-    than their variance tells). All pixels are judged again until none gets any: what one finds, those around it learn.
+    than their variance tells). All pixels are judged again and again: what one finds, those around it learn.
 
     In the variance the 3 x 3 pixels around have a part, and so has what their means differ by: few samples of its own
     may all miss an edge, and to stop where they happen to agree would make a bias.
@@ -74,9 +76,13 @@ class ByVariance(Adaptive):
     ----------
     begin, most : int
         Samples of a pixel, at first and at most.
+    rounds : int
+        Times that pixels are judged, at most: as often as it takes to get four times as many up to the most, and once
+        more for what was learnt meanwhile. More, of fewer and fewer pixels, take time and gain nothing.
     """
 
     def __init__(self, *arguments):
         super().__init__(*arguments)
         self.most = 4**self.level
         self.begin = min(max(self.samples, FIRST), self.most)
+        self.rounds = math.ceil(math.log(self.most / self.begin, 4) - 1e-9) + 1

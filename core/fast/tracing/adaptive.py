@@ -131,8 +131,10 @@ class Variance(ByVariance):
         n = np.zeros(shape, np.int64)
         total, squares, rays = np.zeros((*shape, 3)), np.zeros((*shape, 3)), np.zeros(shape)
         more, left = np.full(shape, self.begin), 1.0
-        while more.any():
-            # Each round has about half as many rays as the one before.
+        for turn in range(1 + self.rounds):
+            if turn:
+                more = np.minimum(n * self._worth(n, total, squares, rays), self.most - n)
+            # Each turn has about half as many rays as the one before.
             left *= 0.5
             for i, tile in enumerate(order):
                 part = np.s_[tile[1] - y0 : tile[3] - y0, tile[0] - x0 : tile[2] - x0]
@@ -154,7 +156,6 @@ class Variance(ByVariance):
                 first = {name: np.concatenate(values) for name, values in first.items()}
                 first["combined"] = (total[part] / n[part][..., None]).reshape(-1, 3)
                 yield 1.0 - left * (2.0 - (i + 1) / len(order)), tile, first, _joined(spent)
-            more = np.minimum(n * self._worth(n, total, squares, rays), self.most - n)
 
     @staticmethod
     def _samples(n, more):

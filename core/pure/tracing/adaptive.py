@@ -119,8 +119,13 @@ class Variance(Counted, ByVariance):
         self.state = {pixel: (0, (0.0,) * 3, (0.0,) * 3) for pixel in everywhere}
         self.rays = dict.fromkeys(everywhere, 0)
         more, left = dict.fromkeys(everywhere, self.begin), 1.0
-        while any(more.values()):
-            # Each round has about half as many rays as the one before.
+        for turn in range(1 + self.rounds):
+            if turn:
+                variances = {pixel: self._variance(pixel) for pixel in everywhere}
+                cost = sum(self.rays[pixel] / self.state[pixel][0] for pixel in everywhere) / len(everywhere)
+                for pixel, (n, *_) in self.state.items():
+                    more[pixel] = min(n * self._worth(pixel, variances, cost), self.most - n)
+            # Each turn has about half as many rays as the one before.
             left *= 0.5
             for i, tile in enumerate(order):
                 out, combined, worked = {}, [], False
@@ -135,10 +140,6 @@ class Variance(Counted, ByVariance):
                 if worked:
                     fraction = 1.0 - left * (2.0 - (i + 1) / len(order))
                     yield fraction, tile, {**out, "combined": combined}, self._spent()
-            variances = {pixel: self._variance(pixel) for pixel in everywhere}
-            cost = sum(self.rays[pixel] / self.state[pixel][0] for pixel in everywhere) / len(everywhere)
-            for pixel, (n, *_) in self.state.items():
-                more[pixel] = min(n * self._worth(pixel, variances, cost), self.most - n)
 
     def _sampled(self, x, y):
         """Take a pixel's next sample; the passes that the first one gives."""
