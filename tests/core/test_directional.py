@@ -290,6 +290,11 @@ def test_light_buffers_within_limits(core, max_bytes, resolution):
     if max_bytes == 1e3:
         assert len(index.buffers) == 1 and any("max_bytes" in str(notice) for notice in index.notices)
     assert index._second is None or core == "pure"
+    # Sums that are kept while buffers come and go are those of the buffers there are.
+    if core == "fast":
+        counts = np.concatenate([count for buffer in index.buffers.values() for count in buffer.counts])
+        assert (index.figures["N_E"], index.figures["N_EE"], index.figures["N_ER"]) == (len(counts), np.count_nonzero(counts == 0), counts.sum())
+        assert index.figures["memory"] == sum(buffer.nbytes for buffer in index.buffers.values())
 
 
 @pytest.mark.parametrize("core", CORES)

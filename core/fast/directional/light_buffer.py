@@ -12,7 +12,7 @@ from ...hits import Cells
 from ..rays import blocks
 from ..structure import Structure
 from .cube import Cube
-from .lists import LOSS, Listed, Lists, centre_buffer
+from .lists import CELLS_AT_LEAST, LOSS, Listed, Lists, centre_buffer
 from .second import Handing
 from .view import View
 
@@ -20,6 +20,8 @@ from .view import View
 BESIDE = 2.0**-46
 #: Half the edge of the cubes that are drawn: relative to the scene, or to its distance if that is more.
 SHOWN, SHOWN_AWAY = 0.02, 0.25
+#: With more lights the cells of their buffers become fewer.
+FEW_LIGHTS = 16
 #: A batch of rays whose light is not told is compared with so many lights.
 LIGHTS_TRIED = 16
 
@@ -40,11 +42,12 @@ class LightBuffer(Handing):
     def build(self, progress, resolution, max_bytes, faces, z_buffer):
         self.resolution, self.max_bytes = resolution, max_bytes
         self.adaptive, self.cuts = faces == "adaptive", z_buffer
-        self.buffers = {}
+        self.buffers, self._used, self._total = {}, {}, np.zeros(4, np.int64)
         p = self.primitives
         with np.errstate(all="ignore"):
             self.extra = 2.0 * float(max(np.abs(p.lo).max(), np.abs(p.hi).max()))
         self.lights = [light for light in getattr(self.scene, "lights", ()) if self._fits(light)]
+        self.least = CELLS_AT_LEAST * FEW_LIGHTS // max(FEW_LIGHTS, len(self.lights))
         if not self.lights:
             self.notices.append(self.needs("a light", "Add one, or name another technique for shadow rays."))
 
@@ -75,7 +78,7 @@ class LightBuffer(Handing):
             light = self.lights[number]
             kind = _Sun if light.kind == "sun" else _Point
             buffer = kind(light, self.primitives, self.extra, self.resolution, self.max_bytes,
-                          adaptive=self.adaptive, z_buffer=self.z_buffer if self.cuts else None)
+                          adaptive=self.adaptive, least=self.least, z_buffer=self.z_buffer if self.cuts else None)
         self.buffers[number] = buffer
         return buffer
 
@@ -107,13 +110,20 @@ class LightBuffer(Handing):
         return max(SHOWN * self.extra, SHOWN_AWAY * away)
 
     def _make_room(self, number):
-        """Give up the buffers not used for longest when all take too much memory."""
-        while len(self.buffers) > 1 and sum(b.nbytes for b in self.buffers.values()) > self.max_bytes:
-            self.buffers.pop(next(iter(self.buffers)))
-        used = sum(b.nbytes for b in self.buffers.values())
+        """Give up the buffers not used for longest when all take too much memory, after one has grown; keep the figures."""
+        buffer = self.buffers[number]
+        counts = np.concatenate([*buffer.counts, np.zeros(0, np.int64)])
+        self._total -= self._used.get(number, 0)
+        # Of thousands of lights each is counted once.
+        self._used[number] = np.array([len(counts), np.count_nonzero(counts == 0), counts.sum(), buffer.nbytes])
+        self._total += self._used[number]
+        while len(self.buffers) > 1 and self._total[3] > self.max_bytes:
+            oldest = next(iter(self.buffers))
+            del self.buffers[oldest]
+            self._total -= self._used.pop(oldest)
+        cells, empty, entries, used = self._total.tolist()
         second = self._second.figures["memory"] if self._second is not None else 0
-        counts = np.concatenate([count for b in self.buffers.values() for count in b.counts] or [np.zeros(0, np.int64)])
-        self.figures.update(N_E=len(counts), N_EE=int(np.count_nonzero(counts == 0)), N_ER=int(counts.sum()), memory=used + second)
+        self.figures.update(N_E=cells, N_EE=empty, N_ER=entries, memory=used + second)
         if used > self.max_bytes and not any(n.name == self.lights[number].name for n in self.notices):
             self.notices.append(Notice(self.lights[number].name, f"its buffer takes {used} bytes, more than max_bytes = {self.max_bytes:g}, though "
                                        "its resolution was lowered. Raise max_bytes, or name another technique for shadow rays."))

@@ -19,7 +19,7 @@ from .view import Footprints
 #: Levels of an adaptive window, where no resolution is asked for.
 LEVELS = 8
 
-#: Cells, where no resolution is asked for: as many as there are footprints, and this many at least.
+#: Cells, where no resolution is asked for: as many as there are footprints, and, of one window among few, this many at least.
 CELLS_AT_LEAST = 128 * 128
 #: Cells along a side, at most.
 MOST_ALONG = 2048
@@ -211,10 +211,13 @@ class Lists:
         cover it, -1 for none.
     occludes : callable, optional
         As of :class:`Quadtree`.
+    least : int
+        Cells of a uniform window, at least, where no resolution is asked for.
     """
 
-    def __init__(self, view, primitives, resolution=0, most_bytes=np.inf, which=None, adaptive=False, z_buffer=None, occludes=None):
-        self.view, self.primitives = view, primitives
+    def __init__(self, view, primitives, resolution=0, most_bytes=np.inf, which=None, adaptive=False, z_buffer=None, occludes=None,
+                 least=CELLS_AT_LEAST):
+        self.view, self.primitives, self.least = view, primitives, least
         self.feet = feet = Footprints.of(view, primitives, which=which)
         self.grid, self.entry, self.nbytes = None, np.zeros(0, np.int32), 0
         # Nothing seen: one cell that lists nothing.
@@ -244,7 +247,7 @@ class Lists:
         if resolution:
             along = [max(1, round(resolution * side / 2.0)) for side in (wide, high)]
         else:
-            cells = max(len(feet), CELLS_AT_LEAST)
+            cells = max(len(feet), self.least)
             along = [np.clip(np.sqrt(cells * a / b), 1, MOST_ALONG) for a, b in ((wide, high), (high, wide))]
         while True:
             self.grid = Grid.over(int(along[0]), int(along[1]), u_lo, u_lo + wide, v_lo, v_lo + high)
