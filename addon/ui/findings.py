@@ -5,7 +5,7 @@ import textwrap
 import bpy
 
 from .operators import Work
-from .panels import Sidebar, characters, draw_job
+from .panels import Sidebar, characters, draw_job, table
 from .. import inspection
 
 #: Rows and findings shown, at most.
@@ -85,16 +85,14 @@ def draw_finding(layout, finding, width):
 
 def draw_costs(layout, result):
     """The most expensive objects."""
-    table = layout.grid_flow(row_major=True, columns=3, even_columns=False, align=True)
-    for text in ("Object", "Tests", "Steps"):
-        table.label(text=text)
+    names, tests, steps = table(layout, 0.55, "Object", "Tests", "Steps")
     for row in result.rows[:SHOWN]:
         if row["copies"]:
-            draw_select(table, [row["object"]], row["object"])
+            draw_select(names, [row["object"]], row["object"])
         else:
-            table.label(text=row["object"])
-        table.label(text=f"{row['tests']:.0%}")
-        table.label(text=f"{row['steps']:.0%}")
+            names.label(text=row["object"])
+        tests.label(text=f"{row['tests']:.0%}")
+        steps.label(text=f"{row['steps']:.0%}")
 
 
 class RAYSCOPE_PT_findings(Sidebar, bpy.types.Panel):

@@ -57,21 +57,23 @@ def draw_figures(layout, scene):
     rays = session.rays_of(scene)
     if rays:
         counted = [name for name in ("N_IT", "N_TS") if all(name in row for row in rays.values())]
-        column = layout.column(align=True)
-        draw_line(column, "Rays", "", *counted)
+        columns = table(layout, 0.35, "Rays", "", *counted)
         for kind, row in rays.items():
-            draw_line(column, kind.title(), f"{row['rays']:,}", *(f"{row[name]:.3g}" for name in counted))
+            texts = kind.title(), f"{row['rays']:,}", *(f"{row[name]:.3g}" for name in counted)
+            for column, text in zip(columns, texts):
+                column.label(text=text)
 
 
-def draw_line(layout, first, *numbers):
-    """A line of a table: a name on the left, numbers on the right."""
-    split = layout.split(factor=0.35)
-    split.label(text=first)
-    row = split.row()
-    for number in numbers:
-        cell = row.row()
-        cell.alignment = "RIGHT"
-        cell.label(text=number)
+def table(layout, share, *headings):
+    """The columns of a table, with their headings: names on the left, which take a share of the width, then numbers."""
+    split = layout.split(factor=share)
+    names, rest = split.column(align=True), split.row()
+    columns = [names, *(rest.column(align=True) for _ in headings[1:])]
+    for column, heading in zip(columns, headings):
+        column.label(text=heading)
+    for column in columns[1:]:
+        column.alignment = "RIGHT"
+    return columns
 
 
 def draw_overlay(layout, scene):
@@ -109,7 +111,7 @@ def _ends(built, *choice):
 
 def characters(context):
     """About how many characters go into a line of a panel."""
-    return max(24, int(context.region.width / (7.5 * context.preferences.system.ui_scale)))
+    return max(24, int(context.region.width / (8 * context.preferences.system.ui_scale)))
 
 
 def draw_notices(layout, scene, width):

@@ -135,7 +135,7 @@ class Sheet:
     def box(self, **_):
         return Sheet(self.notes)
 
-    row = column = grid_flow = box
+    row = column = split = box
 
 
 def test_what_the_panels_show(scene):
