@@ -299,19 +299,20 @@ class _Sweep:
         for name, how in (("samples", {}), ("random samples", {"sampling": "random"})):
             curve("antialiasing", name, [(f"{n} samples", {"samples": n, **how}) for n in doubling if n > 1])
         levels = int(math.log(finest, 4) + 1e-9)
-        if levels >= 1:
-            for way in ("corners", "variance"):
-                base = {"antialiasing": way, "aa_level": levels}
-                curve(
-                    "antialiasing",
-                    f"{way}, 4^{levels} samples at most",
-                    [(f"aa_threshold {t:g}", {"aa_threshold": t}) for t in (0.3, 0.1, 0.03, 0.01)],
-                    **base,
+        # The variance of fewer than 4 samples says little.
+        for way, least in (("corners", 1), ("variance", 2)):
+            if levels < least:
+                left_out.append(
+                    f"adaptive antialiasing, {way}: it needs {4**least} samples a pixel; there is time for fewer. "
+                    "Give more --seconds, or a smaller --size."
                 )
-        else:
-            left_out.append(
-                "adaptive antialiasing: it needs 4 samples a pixel; there is time for fewer. "
-                "Give more --seconds, or a smaller --size."
+                continue
+            curve(
+                "antialiasing",
+                f"{way}, 4^{levels} samples at most",
+                [(f"aa_threshold {t:g}", {"aa_threshold": t}) for t in (0.3, 0.1, 0.03, 0.01)],
+                antialiasing=way,
+                aa_level=levels,
             )
         some = max(finest // 4, 2)
         if any(m.reflects for m in materials):
