@@ -362,7 +362,8 @@ class Rendering:
         # Some is known only now.
         for kind in self._contenders:
             self.result.structures[kind] = self.result.structures[kind].leader
-        self.result.notices += [n for n in self._tracer.notices if n not in self.result.notices]
+        told = [n for structure in self.result.structures.values() for n in structure.notices]
+        self.result.notices += dict.fromkeys(n for n in (*told, *self._tracer.notices) if n not in self.result.notices)
 
     def _sampled(self, order):
         """Take as many samples everywhere; yield how much is done, and the tile."""
