@@ -195,7 +195,7 @@ class _Sweep:
         self.say(f"{len(settings)} settings up to {finest} samples a pixel; reference with {FINER * finest}")
         least = cost * (FINER * finest + 2.5 * FEWEST_POINTS * FEWEST)
         if least > self.seconds:
-            self.say(f"the reference and {FEWEST_POINTS} settings are the least there is: they take about {least:.0f} s")
+            self.say(f"the reference and {FEWEST_POINTS} settings are the least there is: about {least:.0f} s")
         halves = [
             self._traced({**self.full, "samples": FINER * finest // 2}, self.seed + 1 + k, work=FINER * finest / 2)
             for k in (0, 1)
