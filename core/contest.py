@@ -7,7 +7,8 @@ import numpy as np
 from .fast.rays import left, part
 from .hits import Hits
 
-#: Part of what rays will still take, about, that a trial and what is built for it may cost: whatever comes of it, little is lost.
+#: Part of what rays will still take, about, that a trial and what is built for it may cost: whatever comes of it,
+#: little is lost.
 SHARE = 0.04
 #: Rays have taken so long before the first trial: then it is known what one takes. Seconds.
 START = 0.02
@@ -15,11 +16,13 @@ START = 0.02
 GROWTH = 4
 #: Of rays that came, so many times as many are thought to come yet, if more came than were expected.
 LASTING = 0.5
-#: Rays that each structure gets in the second heat of a trial, at least and at most; the first has an eighth of them. The second
-#: is for those that took no more than CLOSE times as long as the best in the first.
+#: Rays that each structure gets in the second heat of a trial, at least and at most; the first has an eighth of them.
+#: The second is for those that took no more than CLOSE times as long as the best in the first.
 LEAST, MOST, FIRST_HEAT, CLOSE = 512, 2048, 8, 4.0
 #: A structure on trial takes so many times as long as the leader, about: what a trial will cost.
 SLOWER = 2.0
+#: Batches that a structure is asked in a trial.
+ASKED = 3
 #: Neighbouring rays that go to the same structure in a trial: as many as are traced well together.
 BLOCK = 64
 #: Rays that a new structure is asked before its trial: some techniques make their lists when the first rays come.
@@ -29,11 +32,11 @@ WARM = 32
 class Contest:
     """Several structures of the numpy core over one scene, as one that answers one kind of ray.
 
-    In a trial blocks of neighbouring rays go to each in turn, so that all have the same kind of rays, from the same places
-    and at the same moment. As numpy's calls take the same time for few rays as for many, two heats tell what a batch takes
-    and what a ray takes. All other rays go to the structure that is the quickest with so many. Trials come when there were
-    many rays to come, and then ever more seldom, so the slower structures get a small part of the picture, which is no part
-    lost: their answers are the same.
+    In a trial blocks of neighbouring rays go to each in turn, so that all have the same kind of rays, from the same
+    places and at the same moment. As numpy's calls take the same time for few rays as for many, two heats tell what a
+    batch takes and what a ray takes. All other rays go to the structure that is the quickest with so many. Trials come
+    when there are many rays to come, and then ever more seldom, so the slower structures get a small part of the
+    picture, which is no part lost: their answers are the same.
 
     Parameters
     ----------
@@ -48,6 +51,7 @@ class Contest:
     def __init__(self, structure, others, expected):
         self.structures, self.others, self.expected = [structure], list(others), expected
         self.seen, self.seconds, self._due = 0, 0.0, START
+        self._small, self._large = (np.inf, 0.0), (0, 0.0)  # batches: rays, seconds
         self.batch, self.ray = [0.0], [0.0]
         self._own = {}
 
@@ -84,48 +88,89 @@ class Contest:
             self._own[key] = self.structures[number].for_light(light)
         return self._own[key]
 
-    def closest(self, origins, directions, t_min=0.0, t_max=np.inf, count=False, progress=None, leaving=None, light=None):
+    def closest(
+        self, origins, directions, t_min=0.0, t_max=np.inf, count=False, progress=None, leaving=None, light=None
+    ):
         """As of a structure."""
+
         def ask(structure, which):
-            return structure.closest(origins[which], directions[which], part(t_min, which), part(t_max, which), count, progress,
-                                     left(structure, leaving, which))
+            return structure.closest(
+                origins[which],
+                directions[which],
+                part(t_min, which),
+                part(t_max, which),
+                count,
+                progress,
+                left(structure, leaving, which),
+            )
 
         answers, order = self._put(len(origins), ask, light)
         if order is None:
             return answers[0]
         return Hits.joined(answers).take(order)
 
-    def occluded(self, origins, directions, t_min=0.0, t_max=np.inf, count=False, progress=None, leaving=None, through=None, light=None):
+    def occluded(
+        self,
+        origins,
+        directions,
+        t_min=0.0,
+        t_max=np.inf,
+        count=False,
+        progress=None,
+        leaving=None,
+        through=None,
+        light=None,
+    ):
         """As of a structure."""
+
         def ask(structure, which):
-            answer = structure.occluded(origins[which], directions[which], part(t_min, which), part(t_max, which), count, progress,
-                                        left(structure, leaving, which), through)
+            answer = structure.occluded(
+                origins[which],
+                directions[which],
+                part(t_min, which),
+                part(t_max, which),
+                count,
+                progress,
+                left(structure, leaving, which),
+                through,
+            )
             return answer if count else (answer, {})
 
         answers, order = self._put(len(origins), ask, light)
         if order is not None:
-            answers = [(np.concatenate([a for a, _ in answers])[order],
-                        {name: np.concatenate([c[name] for _, c in answers])[order] for name in answers[0][1]})]
+            answers = [
+                (
+                    np.concatenate([a for a, _ in answers])[order],
+                    {name: np.concatenate([c[name] for _, c in answers])[order] for name in answers[0][1]},
+                )
+            ]
         return answers[0] if count else answers[0][0]
 
     def _put(self, n, ask, light):
         """Answers of n rays, and the order that they are to be brought into; None where there is one answer."""
-        start = time.thread_time()                                          # not the clock: others may use the processor too
+        start = time.thread_time()  # not the clock: others may use the processor too
         parts, answers, done = [], [], 0
         if self.seconds >= self._due and self.seen:
             parts, answers, done = self._trial(n, ask, light)
         answers.append(ask(self.asked(self._quickest(n), light), slice(done, n) if done else slice(None)))
-        self.seen += n
-        self.seconds += time.thread_time() - start
+        took = time.thread_time() - start
+        self.seen, self.seconds = self.seen + n, self.seconds + took
+        self._small, self._large = min(self._small, (n, took)), max(self._large, (n, took))
         if not done:
             return answers, None
         return answers, np.argsort(np.concatenate([*parts, np.arange(done, n)]))
 
+    def _batch(self):
+        """Seconds of a batch however few its rays, as far as the least and the greatest so far tell."""
+        (few, less), (many, more) = self._small, self._large
+        return max(less - few * max(more - less, 0.0) / (many - few), 0.0) if many >= 2 * few else 0.0
+
     def _entered(self, n):
-        """Who takes part in a trial among n rays: what is to be built, and how many rays each gets in the second heat."""
+        """Who takes part in a trial among n rays: what is to be built for it, and how many rays each gets at last."""
         ray = self.seconds / self.seen
         left = SHARE * ray * max(self.expected - self.seen, LASTING * self.seen)
-        own = SLOWER * LEAST * ray
+        # Few rays may take as long as many.
+        own = SLOWER * LEAST * ray + ASKED * self._batch()
         left -= own * (len(self.structures) - 1)
         pays = []
         for other in self.others:
@@ -167,7 +212,7 @@ class Contest:
             (few, rays), (many, more) = own[0], own[-1]
             ray = max(many - few, 0.0) / (more - rays) if len(own) > 1 else few / rays
             batch = max(few - ray * rays, 0.0)
-            old = self.ray[number] + self.batch[number] > 0.0               # of what was seen before a half still counts
+            old = self.ray[number] + self.batch[number] > 0.0  # of what was seen before a half still counts
             self.ray[number] = 0.5 * (ray + self.ray[number]) if old else ray
             self.batch[number] = 0.5 * (batch + self.batch[number]) if old else batch
         return parts, answers, done

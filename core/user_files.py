@@ -22,12 +22,16 @@ def folder():
     if given:
         return Path(given) / "rayscope"
     if sys.platform == "win32":
-        return Path(os.environ.get("LOCALAPPDATA") or Path(os.path.expanduser("~"), "AppData", "Local")) / "rayscope" / "cache"
+        return (
+            Path(os.environ.get("LOCALAPPDATA") or Path(os.path.expanduser("~"), "AppData", "Local"))
+            / "rayscope"
+            / "cache"
+        )
     return Path(os.path.expanduser("~")) / ("Library/Caches" if sys.platform == "darwin" else ".cache") / "rayscope"
 
 
 def write(path, text):
-    """Write a file as a whole, so that nobody reads half of it. A file that cannot be written is none: nothing is raised."""
+    """Write a file as a whole, so that nobody reads half of it; where that is not possible, nothing is raised."""
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         handle, name = tempfile.mkstemp(dir=path.parent)

@@ -4,7 +4,7 @@ import math
 import time
 from statistics import median
 
-from ..catalogue import ALL_RAYS, technique, techniques
+from ..catalogue import ALL_RAYS, techniques
 from ..errors import Cancelled
 from ..options import AUTOMATIC, STANDARD
 from ..rendering import Rendering
@@ -12,12 +12,13 @@ from ..scene.spd import DATABASES, spd
 from .needs.calibrated import calibration
 from .needs.ground import lit, triangles
 
-#: A fixed choice is traced at half the size first. What would take so many times as long as the best at the full size is given
-#: up, and so is what takes such a part of the best one's whole time to build besides what STANDARD takes.
+#: A fixed choice is traced at half the size first. What would take so many times as long as the best at the full size
+#: is given up, and so is what takes such a part of the best one's whole time to build besides what STANDARD takes.
 HOPELESS, BUILD = 1.5, 0.5
 #: So many of the others take part in the turns: the best of one run need not be the best.
 CLOSE = 1
-#: Turns are taken until all took so long together, but not more often than MOST; if they take LONG, twice only. Seconds.
+#: Turns are taken until all took so long together, but not more often than MOST; if they take LONG, twice only.
+#: Seconds.
 QUICK, MOST, LONG = 3.0, 12, 30.0
 #: What the automatic choice may take more than the best fixed one, and than STANDARD.
 BARS = (0.15, 0.1)
@@ -34,27 +35,29 @@ def against_fixed(scene, size=(240, 180), core="fast", choices=None, repeats=3):
     size : (int, int)
     core : {"fast", "pure"}
     choices : list of dict, optional
-        Kind of ray -> technique; other kinds have STANDARD. All techniques for all the kinds that they serve if absent, and
-        TOGETHER.
+        Kind of ray -> technique; other kinds have STANDARD. All techniques for all the kinds that they serve if absent,
+        and TOGETHER.
     repeats : int
         Turns, at least; more where they are quick, fewer where they take very long.
 
     Returns
     -------
     dict
-        scene, choice; automatic, best, bvh: the least seconds of the processor, for everything; best_technique; over_best,
-        over_bvh: automatic over each, minus 1, the median of the turns; range: of over_best among them.
+        scene, choice; automatic, best, bvh: the least seconds of the processor, for everything; best_technique;
+        over_best, over_bvh: automatic over each, minus 1, the median of the turns; range: of over_best among them.
     """
-    calibration(core, math.inf)                                         # all of it, as any user has it in the end
+    calibration(core, math.inf)  # all of it, as any user has it in the end
     fixed = {_label(choice): choice for choice in ({}, *(_choices(core) if choices is None else choices))}
-    for choice in fixed.values():                                       # importing is not tracing
+    for choice in fixed.values():  # importing is not tracing
         _traced(lit(triangles(20)), choice, core, (4, 4))
     half, guessed, least, standard = tuple(max(1, side // 2) for side in size), {}, math.inf, 0.0
     for label, choice in fixed.items():
-        build, rays, _ = _traced(scene, choice, core, half, lambda b, r: b > standard + BUILD * least or b + 4.0 * r > HOPELESS * least)
+        build, rays, _ = _traced(
+            scene, choice, core, half, lambda b, r: b > standard + BUILD * least or b + 4.0 * r > HOPELESS * least
+        )
         guessed[label] = build + 4.0 * rays
         least, standard = min(least, guessed[label]), standard or build
-    close = sorted((label for label in fixed if guessed[label] <= HOPELESS * least), key=guessed.get)[:1 + CLOSE]
+    close = sorted((label for label in fixed if guessed[label] <= HOPELESS * least), key=guessed.get)[: 1 + CLOSE]
     # In turns: a busy moment hits all alike, and ratios stay as they are.
     names, chosen, rounds, began = dict.fromkeys((AUTOMATIC, *close, STANDARD)), {}, [], time.process_time()
     while len(rounds) < repeats or time.process_time() - began < QUICK and len(rounds) < MOST:
@@ -67,16 +70,32 @@ def against_fixed(scene, size=(240, 180), core="fast", choices=None, repeats=3):
             break
     best = min(dict.fromkeys((*close, STANDARD)), key=lambda name: median(row[name] for row in rounds))
     ratios = {name: sorted(row[AUTOMATIC] / row[name] - 1.0 for row in rounds) for name in (best, STANDARD)}
-    return {"scene": scene.name, "choice": " ".join(f"{k}={v}" for k, v in chosen.items()),
-            **{column: min(row[name] for row in rounds) for column, name in ((AUTOMATIC, AUTOMATIC), ("best", best), (STANDARD, STANDARD))},
-            "best_technique": best, "over_best": median(ratios[best]), "over_bvh": median(ratios[STANDARD]),
-            "range": f"{ratios[best][0]:+.0%} .. {ratios[best][-1]:+.0%}", "turns": len(rounds)}
+    return {
+        "scene": scene.name,
+        "choice": " ".join(f"{k}={v}" for k, v in chosen.items()),
+        **{
+            column: min(row[name] for row in rounds)
+            for column, name in ((AUTOMATIC, AUTOMATIC), ("best", best), (STANDARD, STANDARD))
+        },
+        "best_technique": best,
+        "over_best": median(ratios[best]),
+        "over_bvh": median(ratios[STANDARD]),
+        "range": f"{ratios[best][0]:+.0%} .. {ratios[best][-1]:+.0%}",
+        "turns": len(rounds),
+    }
 
 
 def _choices(core):
     """The fixed choices."""
-    rows = [row for row in techniques() if row.family not in ("peers", "generalised") and core in row.cores and row.name != STANDARD]
-    return [*TOGETHER, *({kind: row.name for kind in row.rays} for row in sorted(rows, key=lambda row: row.family != "directional"))]
+    rows = [
+        row
+        for row in techniques()
+        if row.family not in ("peers", "generalised") and core in row.cores and row.name != STANDARD
+    ]
+    return [
+        *TOGETHER,
+        *({kind: row.name for kind in row.rays} for row in sorted(rows, key=lambda row: row.family != "directional")),
+    ]
 
 
 def _label(choice):
@@ -85,8 +104,8 @@ def _label(choice):
 
 
 def _traced(scene, choice, core, size, hopeless=None):
-    """Seconds of the processor for building and for tracing, and the Result; infinite where `hopeless`, told both so far, says so."""
-    start, built = time.process_time(), None                            # not the clock: others may use the processor too
+    """Seconds of the processor for building and for tracing, and the Result; infinite where `hopeless` gives it up."""
+    start, built = time.process_time(), None  # not the clock: others may use the processor too
 
     def stop(fraction):
         now = time.process_time()
@@ -109,7 +128,7 @@ def _traced(scene, choice, core, size, hopeless=None):
 
 
 def benchmark(scenes=(), size=(240, 180), core="fast", repeats=3, only=None, say=lambda line: None):
-    """The automatic choice against the best fixed one and STANDARD, on the standard procedural databases and more scenes.
+    """The automatic choice against the best fixed one and STANDARD, on the procedural databases and more scenes.
 
     Parameters
     ----------
@@ -131,8 +150,11 @@ def benchmark(scenes=(), size=(240, 180), core="fast", repeats=3, only=None, say
     rows = []
     for scene in _wanted(scenes, only):
         rows.append(against_fixed(scene, size, core, repeats=repeats))
-        say(f"{scene.name}: {rows[-1]['over_best']:+.0%} ({rows[-1]['range']}) over {rows[-1]['best_technique']}, {rows[-1]['over_bvh']:+.0%} over {STANDARD}; "
-            f"{rows[-1]['choice']}")
+        row = rows[-1]
+        say(
+            f"{scene.name}: {row['over_best']:+.0%} ({row['range']}) over {row['best_technique']}, "
+            f"{row['over_bvh']:+.0%} over {STANDARD}; {row['choice']}"
+        )
     return rows, [row["scene"] for row in rows if row["over_best"] > BARS[0] or row["over_bvh"] > BARS[1]]
 
 

@@ -112,6 +112,24 @@ def test_a_batch_counts_as_well_as_a_ray(built):
     assert light.rays == before + 100
 
 
+def test_no_trial_where_a_batch_takes_long_however_few_its_rays(built):
+    """Three batches for each that is new would cost more than the rays to come."""
+    class Heavy(Slow):
+        def _ask(self, method, arguments):
+            until = time.thread_time() + 0.05
+            while time.thread_time() < until:
+                pass
+            return super()._ask(method, arguments)
+
+    heavy, light = Heavy(built[0], 0.0), Slow(built[1], 0.0)
+    rays = ray_sets(SCENE, built[0], 8000, 0)[0]
+    for expected, tried in ((20_000, False), (10**7, True)):
+        contest = Contest(heavy, [(lambda: light, 0.0)], expected)
+        for n in (2000, 6000, 8000):
+            rays.take(slice(0, n)).ask(contest)
+        assert bool(light.rays) is tried
+
+
 def test_lights_share_a_contest(built):
     lights = [Light(f"light {k}", "point", (1, 1, 1), (2.0 + k, 0.0, 0.0)) for k in range(2)]
     slow, quick = Slow(built[0], 1e-4), Slow(built[1], 0.0)

@@ -12,7 +12,6 @@ import pytest
 from rayscope.core import Camera, Light, Material, Mesh, Object, Scene, Shapes, build, solids, trace
 from rayscope.core import catalogue
 from rayscope.core.command import main
-from rayscope.core.contest import Contest
 from rayscope.core import user_files
 from rayscope.core.lab import automatic, needs
 from rayscope.core.lab.needs import calibrated, ground, kept, left_out, model

@@ -16,10 +16,12 @@ TRUST = 3.0
 ROUGH = 3.0
 #: Seconds of processor time after which a process calibrates no further technique: on a busy machine the next goes on.
 BUDGET = 0.4
-#: Calibrated: brute force, which tells what a test costs, the same for all; and what is the quickest for some scene. The first
-#: four in any case.
-CALIBRATED = {"fast": ("brute", STANDARD, "image-directory", "light-buffer", "grid", "macro-grid"),
-              "pure": ("brute", STANDARD, "image-directory", "light-buffer", "grid", "kd-tree", "octree", "macro-grid")}
+#: Calibrated: brute force, which tells what a test costs, the same for all; and what is the quickest for some scene.
+#: The first four in any case.
+CALIBRATED = {
+    "fast": ("brute", STANDARD, "image-directory", "light-buffer", "grid", "macro-grid"),
+    "pure": ("brute", STANDARD, "image-directory", "light-buffer", "grid", "kd-tree", "octree", "macro-grid"),
+}
 
 _known = {}
 
@@ -40,8 +42,8 @@ def calibration(core="fast", budget=BUDGET):
     seconds : float
         Processor time that it took this process.
     """
-    if core not in _known:
-        began, models = time.thread_time(), kept.read(core)
+    if core not in _known or budget > BUDGET:
+        began, models = time.thread_time(), _known[core][0] if core in _known else kept.read(core)
         todo = [name for name in CALIBRATED[core] if name not in models]
         for name in todo:
             if name in CALIBRATED[core][:4] or time.thread_time() - began < budget:
@@ -64,7 +66,11 @@ def rough(core="fast"):
     """
     models, found = calibration(core)[0], kept.read(f"{core} rough")
     # What traces more than rays makes other pictures, and its rays are those of another technique.
-    names = [row.name for row in techniques() if row.family not in ("peers", "generalised") and core in row.cores and row.name not in models]
+    names = [
+        row.name
+        for row in techniques()
+        if row.family not in ("peers", "generalised") and core in row.cores and row.name not in models
+    ]
     if not set(names) <= set(found):
         scenes, standard, looked, sets = (some[:TIMED] for some in ground(core))
         few = [[batch.take(slice(0, 2 * RAYS[core][1])) for batch in batches] for batches in sets]
@@ -88,6 +94,7 @@ def _fitted(name, core, where, brute):
 def _shading(model, core):
     """What a picture takes for each of its rays besides their answers: seconds."""
     from ...rendering import Rendering
+
     scenes, _, looked, _ = ground(core)
     scene, seen = scenes[1], looked[1]
     side = 40 if core == "fast" else 5

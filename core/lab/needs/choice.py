@@ -2,7 +2,7 @@
 
 import itertools
 
-from ...catalogue import ALL_RAYS, technique
+from ...catalogue import technique
 from ...contest import SHARE
 from ...options import STANDARD
 from .calibrated import calibration, candidates
@@ -16,8 +16,8 @@ WAVE = 65_536
 MARGIN = 0.05
 #: And for a kind of ray by this factor.
 SURE = 0.8
-#: What the model has no more than DOUBT times as slow as the choice may be tried while the picture is traced: so many OTHERS
-#: for a kind of ray, at most.
+#: What the model has no more than DOUBT times as slow as the choice may be tried while the picture is traced: so many
+#: OTHERS for a kind of ray, at most.
 DOUBT, OTHERS = 8.0, 2
 #: What a trial takes, at least. Seconds.
 SHORT = 0.01
@@ -57,7 +57,9 @@ def choose(seen, rays, core="fast", calls=None, tests=None):
     calls = {kind: max((calls or {}).get(kind, 1), 1 + number // WAVE) for kind, number in rays.items()}
 
     def total(combination):
-        return sum(builds[name] for name in set(combination) - {STANDARD}) + sum(cost[n, k] for n, k in zip(combination, rays))
+        return sum(builds[name] for name in set(combination) - {STANDARD}) + sum(
+            cost[n, k] for n, k in zip(combination, rays)
+        )
 
     for name, model in sorted(models.items(), key=lambda item: item[0] != STANDARD):
         row = {"technique": name, "T_B": seen.build if name == STANDARD and seen.build else builds[name]}
@@ -71,9 +73,12 @@ def choose(seen, rays, core="fast", calls=None, tests=None):
             rows.append(row)
     standard = (STANDARD,) * len(rays)
     # Of each kind only those that would be quicker by more than the model is wrong, with no build at all.
-    serve = {kind: [name for name in names if name == STANDARD or cost[name, kind] <= SURE * cost[STANDARD, kind]] for kind, names in serve.items()}
+    serve = {
+        kind: [name for name in names if name == STANDARD or cost[name, kind] <= SURE * cost[STANDARD, kind]]
+        for kind, names in serve.items()
+    }
     best = min(itertools.product(*serve.values()), key=total) if rays else ()
-    besides = models[STANDARD].shading * sum(rays.values())             # which no choice saves
+    besides = models[STANDARD].shading * sum(rays.values())  # which no choice saves
     if rays and total(best) + besides > (1.0 - MARGIN) * (total(standard) + besides):
         best = standard
     return dict(zip(rays, best)), sorted(rows, key=lambda row: row["s"])
@@ -87,7 +92,7 @@ def expected_rays(seen, pixels, samples=1, depth=5, looked=None):
     seen : Survey
     pixels, samples, depth : int
     looked : Glance, optional
-        At the picture; without, every ray of the camera meets something, and a third of that mirrors or lets light through.
+        At the picture; without, every ray of the camera meets something, a third of it mirrors or lets light through.
 
     Returns
     -------
@@ -97,9 +102,15 @@ def expected_rays(seen, pixels, samples=1, depth=5, looked=None):
     looked = looked or Glance(1.0, ((2 if seen.glass else bool(seen.mirrors)) + bool(seen.transparent)) / 3.0)
     primary, own = pixels * samples, looked.met * looked.sent_on
     secondary = 0
-    if seen.transparent or depth and (seen.mirrors or seen.glass):          # a glance may miss what is small
-        secondary = max(int(primary * sum(own ** (k + 1) for k in range(max(min(depth, DEEP), 1)))), 1 + primary // RARE)
-    needed = {"primary": primary, "secondary": secondary, "shadow": int(FACING * looked.met * (primary + secondary) * len(seen.lights))}
+    if seen.transparent or depth and (seen.mirrors or seen.glass):  # a glance may miss what is small
+        secondary = max(
+            int(primary * sum(own ** (k + 1) for k in range(max(min(depth, DEEP), 1)))), 1 + primary // RARE
+        )
+    needed = {
+        "primary": primary,
+        "secondary": secondary,
+        "shadow": int(FACING * looked.met * (primary + secondary) * len(seen.lights)),
+    }
     return {kind: number for kind, number in needed.items() if number}
 
 
@@ -107,7 +118,10 @@ def expected_calls(seen, rays, depth=5):
     """Kind of ray -> number of batches: a reflection is traced after what it is seen in, lights one by one."""
     waves = {kind: 1 + number // WAVE for kind, number in rays.items()}
     secondary = max(waves.get("secondary", 0), depth if "secondary" in rays else 0)
-    return waves | {"secondary": secondary, "shadow": max(waves.get("shadow", 0), (waves["primary"] + secondary) * len(seen.lights))}
+    return waves | {
+        "secondary": secondary,
+        "shadow": max(waves.get("shadow", 0), (waves["primary"] + secondary) * len(seen.lights)),
+    }
 
 
 def resolve_automatic(scene, index, size, samples, depth, core, kinds):
@@ -137,7 +151,8 @@ def contenders(choice, rows):
     Returns
     -------
     dict
-        Kind of ray -> list of (name, seconds to build it): the choice, then others, the quickest first; STANDARD is there.
+        Kind of ray -> list of (name, seconds to build it): the choice, then others, the quickest first; STANDARD is
+        there already.
     """
     of, found = {row["technique"]: row for row in rows}, {}
     for kind, name in choice.items():
@@ -145,6 +160,10 @@ def contenders(choice, rows):
         own = [row for row in rows if key in row and row[key] <= DOUBT * of[name][key] and row is not of[name]]
         builds = {row["technique"]: 0.0 if row["technique"] == STANDARD else row["T_B"] for row in (of[name], *own)}
         # What would take too long to build will not be tried.
-        own = [row for row in sorted(own, key=lambda row: row[key]) if builds[row["technique"]] + SHORT <= SHARE * DOUBT * of[name][key]]
+        own = [
+            row
+            for row in sorted(own, key=lambda row: row[key])
+            if builds[row["technique"]] + SHORT <= SHARE * DOUBT * of[name][key]
+        ]
         found[kind] = [(row["technique"], builds[row["technique"]]) for row in (of[name], *own[:OTHERS])]
     return found

@@ -1,4 +1,4 @@
-"""A glance at the picture: a few of the camera's rays tell how much of it there is to see, and how much of that sends rays on."""
+"""A glance at the picture: a few of the camera's rays tell how much there is to see, and what sends rays on."""
 
 from dataclasses import dataclass
 

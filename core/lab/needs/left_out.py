@@ -46,26 +46,57 @@ def left_out(scene, seen, tests, rays, choice, rows, core, size, samples, depth)
         name = next((name for name in choice.values() if kind in technique(name).rays), STANDARD)
         return f"{_about(models[name].per_ray(kind, seen.measures, tests)[2] * number)} for {number:,} rays"
 
-    found = [*_rays(seen, rays, core, primary, depth, time_of), *_parts(seen, rays, core, primary, models[STANDARD]),
-             *_candidates(scene, choice, rows, core), *_others(scene, seen, tests, rays, rows, core, size, samples, depth)]
-    counted = sum(row.get(f"{c} {kind}", 0.0) * rays[kind] for kind, name in choice.items() for row in rows if row["technique"] == name for c in ("N_IT", "N_TS"))
-    found.append(("the passes N_IT and N_TS", "they are counted only with --count",
-                  f"{_about(_tally_seconds(core) * counted)} for {counted:,.0f} tests and steps, and {_bytes(16 * size[0] * size[1])}"))
+    found = [
+        *_rays(seen, rays, core, primary, depth, time_of),
+        *_parts(seen, rays, core, primary, models[STANDARD]),
+        *_candidates(scene, choice, rows, core),
+        *_others(scene, seen, tests, rays, rows, core, size, samples, depth),
+    ]
+    counted = sum(
+        row.get(f"{c} {kind}", 0.0) * rays[kind]
+        for kind, name in choice.items()
+        for row in rows
+        if row["technique"] == name
+        for c in ("N_IT", "N_TS")
+    )
+    found.append(
+        (
+            "the passes N_IT and N_TS",
+            "they are counted only with --count",
+            f"{_about(_tally_seconds(core) * counted)} for {counted:,.0f} tests and steps, "
+            f"and {_bytes(16 * size[0] * size[1])}",
+        )
+    )
     return [{"what": what, "why": why, "cost": cost} for what, why, cost in found]
 
 
 def _rays(seen, rays, core, primary, depth, time_of):
     """Kinds of ray that are not traced: what, why, cost."""
-    third = max(primary // 3, 1)                                        # as `expected_rays` has it
+    third = max(primary // 3, 1)  # as `expected_rays` has it
     if "secondary" not in rays:
-        why = "depth is 0" if not depth and (seen.mirrors or seen.glass) else "no material mirrors, refracts or lets light straight through"
-        yield ("secondary rays", why,
-               f"{time_of('secondary', third)} if a third of what is seen were a mirror, and {_import(core, 'tracing', 'secondary', 'optics')}")
+        why = (
+            "depth is 0"
+            if not depth and (seen.mirrors or seen.glass)
+            else "no material mirrors, refracts or lets light straight through"
+        )
+        yield (
+            "secondary rays",
+            why,
+            f"{time_of('secondary', third)} if a third of what is seen were a mirror, "
+            f"and {_import(core, 'tracing', 'secondary', 'optics')}",
+        )
     if not seen.glass:
-        yield "refraction", "no material has transmission", f"{time_of('secondary', 2 * third)} if a third of what is seen were glass"
+        yield (
+            "refraction",
+            "no material has transmission",
+            f"{time_of('secondary', 2 * third)} if a third of what is seen were glass",
+        )
     if "shadow" not in rays:
-        yield ("shadow rays", "no light casts shadows" if seen.dark_lights else "there is no light",
-               f"{time_of('shadow', primary)} to a light, and {_import(core, 'tracing', 'lights', 'shadows')}")
+        yield (
+            "shadow rays",
+            "no light casts shadows" if seen.dark_lights else "there is no light",
+            f"{time_of('shadow', primary)} to a light, and {_import(core, 'tracing', 'lights', 'shadows')}",
+        )
     for name in seen.dark_lights:
         yield f"shadow rays to {name}", "it casts no shadows, or is black", time_of("shadow", primary)
 
@@ -73,23 +104,43 @@ def _rays(seen, rays, core, primary, depth, time_of):
 def _parts(seen, rays, core, primary, standard):
     """Parts of Rayscope that are not used: what, why, cost."""
     if not seen.textures:
-        yield ("textures", "no material has one",
-               f"{_about(_lookup_seconds(core) * primary)} to look up {primary:,} colours, and {_import(core, 'tracing', 'texture')}")
+        yield (
+            "textures",
+            "no material has one",
+            f"{_about(_lookup_seconds(core) * primary)} to look up {primary:,} colours, "
+            f"and {_import(core, 'tracing', 'texture')}",
+        )
     solid = [k for k in seen.kinds if k not in ("triangle", "instance")]
     if not solid:
-        yield "analytic primitives and Booleans", "there are only triangles", _import(core, "primitives", "solids", *SOLIDS)
+        yield (
+            "analytic primitives and Booleans",
+            "there are only triangles",
+            _import(core, "primitives", "solids", *SOLIDS),
+        )
     elif "csg" not in solid:
         yield "Boolean combinations", "no solids are combined", _import(core, "primitives", "csg")
     if "triangle" not in seen.kinds:
-        yield "triangles", "there are only solids", f"{_import(core, 'primitives', 'triangle')}; nothing is built for them"
+        yield (
+            "triangles",
+            "there are only solids",
+            f"{_import(core, 'primitives', 'triangle')}; nothing is built for them",
+        )
     if "instance" not in seen.kinds:
         number = sum(rays.values())
-        yield ("a second level of structures", "no mesh is shared often enough to be kept once",
-               f"{_about(_change_seconds(core) * number)} if each of {number:,} rays changed its space once, and {_import(core, 'primitives', 'instance')}")
+        yield (
+            "a second level of structures",
+            "no mesh is shared often enough to be kept once",
+            f"{_about(_change_seconds(core) * number)} if each of {number:,} rays changed its space once, "
+            f"and {_import(core, 'primitives', 'instance')}",
+        )
     else:
         build = standard.build_seconds(seen.n + seen.copied) - standard.build_seconds(seen.n)
-        yield ("copies of shared meshes", f"{seen.kinds['instance']} objects are kept as instances",
-               f"{_about(build)} to build {STANDARD} over {seen.copied:,} more triangles, and {_bytes(seen.copied * TRIANGLE_BYTES)}")
+        yield (
+            "copies of shared meshes",
+            f"{seen.kinds['instance']} objects are kept as instances",
+            f"{_about(build)} to build {STANDARD} over {seen.copied:,} more triangles, "
+            f"and {_bytes(seen.copied * TRIANGLE_BYTES)}",
+        )
 
 
 def _candidates(scene, choice, rows, core):
@@ -99,8 +150,14 @@ def _candidates(scene, choice, rows, core):
     for row in rows:
         if row["technique"] not in used:
             slower = row["s"] > sum(chosen) / len(chosen)
-            yield (row["technique"], f"would take longer than {' and '.join(sorted(used))}" if slower else "would gain less than the model is sure of",
-                   f"{_about(row['T_B'])} to build, {_about(row['s'])} in all, {_bytes(estimate(scene, row['technique'], core).bytes)}")
+            yield (
+                row["technique"],
+                f"would take longer than {' and '.join(sorted(used))}"
+                if slower
+                else "would gain less than the model is sure of",
+                f"{_about(row['T_B'])} to build, {_about(row['s'])} in all, "
+                f"{_bytes(estimate(scene, row['technique'], core).bytes)}",
+            )
 
 
 def _others(scene, seen, tests, rays, rows, core, size, samples, depth):
@@ -111,24 +168,33 @@ def _others(scene, seen, tests, rays, rows, core, size, samples, depth):
             continue
         if row.family == "generalised":
             all_of_it = estimate(scene, row.name, core, size, samples, depth)
-            yield (row.name, "it traces other things than rays, and makes other pictures",
-                   f"{_about(all_of_it.seconds)} in all, right to a factor of three, {_bytes(all_of_it.bytes)}, and "
-                   f"{_import(core, row.family, row.module, row.tracer.split('.')[1])}")
+            yield (
+                row.name,
+                "it traces other things than rays, and makes other pictures",
+                f"{_about(all_of_it.seconds)} in all, right to a factor of three, {_bytes(all_of_it.bytes)}, and "
+                f"{_import(core, row.family, row.module, row.tracer.split('.')[1])}",
+            )
             continue
         model = models.get(row.name) or rough(core)[row.name]
-        built = f"{_about(model.build_seconds(seen.n, len(seen.lights)))} to build, {_bytes(estimate(scene, row.name, core).bytes)}"
+        building = model.build_seconds(seen.n, len(seen.lights))
+        built = f"{_about(building)} to build, {_bytes(estimate(scene, row.name, core).bytes)}"
         served = [kind for kind in rays if kind in row.rays]
         if not served:
             yield row.name, f"it serves {' and '.join(row.rays)} rays, and there are none", built
             continue
         if row.name in models:
-            why = f"its time does not follow from its counters: where it was fitted, the model was off by a factor of {model.off:.2g}"
+            why = f"its time does not follow from its counters: the model was off by a factor of {model.off:.2g}"
         elif row.name in CALIBRATED[core]:
             why = "calibrating, which takes no more than a second, did not come to it yet"
         else:
             why = "it was the quickest for no scene that was measured, so it is no candidate and is fitted roughly"
         seconds = sum(model.per_ray(kind, seen.measures, tests)[2] * rays[kind] for kind in served)
-        yield (row.name, why, f"{built}, {_about(seconds)} for {' and '.join(served)} rays, right to a factor of {max(model.off, ROUGH):.2g}")
+        yield (
+            row.name,
+            why,
+            f"{built}, {_about(seconds)} for {' and '.join(served)} rays, "
+            f"right to a factor of {max(model.off, ROUGH):.2g}",
+        )
 
 
 def _about(seconds):
@@ -138,7 +204,13 @@ def _about(seconds):
 
 def _bytes(number):
     """A number of bytes in words."""
-    return f"{number / 1e6:,.0f} MB" if number >= 1e7 else f"{number / 1e6:.2g} MB" if number >= 1e5 else f"{number / 1e3:.2g} kB"
+    return (
+        f"{number / 1e6:,.0f} MB"
+        if number >= 1e7
+        else f"{number / 1e6:.2g} MB"
+        if number >= 1e5
+        else f"{number / 1e3:.2g} kB"
+    )
 
 
 def _import(core, family, *modules):
@@ -148,7 +220,8 @@ def _import(core, family, *modules):
     start = time.perf_counter()
     for file in files:
         SourceFileLoader(file.stem, str(file)).get_code(file.stem)
-    return f"{_about(time.perf_counter() - start)} at least to import {len(files)} module(s), {sum(f.stat().st_size for f in files) / 1e3:.0f} kB"
+    seconds, size = time.perf_counter() - start, sum(f.stat().st_size for f in files)
+    return f"{_about(seconds)} at least to import {len(files)} module(s), {_bytes(size)}"
 
 
 def _change_seconds(core):
@@ -180,6 +253,7 @@ def _tally_seconds(core):
     def add():
         for k in numbers:
             totals[k] += 1
+
     return _clocked(add) / 4000
 
 

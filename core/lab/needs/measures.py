@@ -1,4 +1,4 @@
-"""Looking at a scene once, through the primitives and the bvh that are made in any case: what a line through it meets."""
+"""Looking at a scene once, through what is made in any case, primitives and bvh: what a line through it meets."""
 
 import math
 import time
@@ -18,12 +18,13 @@ NUMBERS = 65_521
 #: Cells a primitive in the grid whose cells and lists are measured.
 CELLS_EACH = 4.0
 
+
 @dataclass
 class Measures:
     """What a line through a scene meets, on average.
 
-    A line that crosses a box of surface A meets a smaller one in it, of surface a, with the probability a / A: so sums of
-    surfaces are numbers of boxes met.
+    A line that crosses a box of surface A meets a smaller one in it, of surface a, with the probability a / A: so sums
+    of surfaces are numbers of boxes met.
 
     Attributes
     ----------
@@ -54,8 +55,16 @@ class Measures:
 
     def inside(self, inner):
         """Of a scene of instances whose meshes have the measures `inner`: each instance met is a scene to cross."""
-        return Measures(1.0, self.all * (1.0 + inner.all), self.pierced * inner.pierced, self.nodes + self.pierced * inner.nodes,
-                        self.cells + self.listed * inner.cells, self.listed * (1.0 + inner.listed), max(self.crowd, inner.crowd))
+        return Measures(
+            1.0,
+            self.all * (1.0 + inner.all),
+            self.pierced * inner.pierced,
+            self.nodes + self.pierced * inner.nodes,
+            self.cells + self.listed * inner.cells,
+            self.listed * (1.0 + inner.listed),
+            max(self.crowd, inner.crowd),
+        )
+
 
 @dataclass
 class Survey:
@@ -120,21 +129,42 @@ def survey(scene, index=None):
     materials = scene.used_materials()
     lit = {id(light): light.shadows and any(light.colour) for light in scene.lights}
     return Survey(
-        index.figures["N"] + inner, measures, {k: v for k, v in kinds.items() if v},
+        index.figures["N"] + inner,
+        measures,
+        {k: v for k, v in kinds.items() if v},
         sum(mesh.figures["N"] * number for mesh, number in meshes.items()) - inner,
-        [m.name for m in materials if m.mirror or m.mirror_base], [m.name for m in materials if m.transmission],
-        [m.name for m in materials if m.transparent], [m.name for m in materials if m.texture is not None],
-        [light.name for light in scene.lights if lit[id(light)]], [light.name for light in scene.lights if not lit[id(light)]],
-        max(map(abs, (*lo, *hi))), math.dist(lo, hi), time.perf_counter() - began, index.figures.get("T_B", 0.0))
+        [m.name for m in materials if m.mirror or m.mirror_base],
+        [m.name for m in materials if m.transmission],
+        [m.name for m in materials if m.transparent],
+        [m.name for m in materials if m.texture is not None],
+        [light.name for light in scene.lights if lit[id(light)]],
+        [light.name for light in scene.lights if not lit[id(light)]],
+        max(map(abs, (*lo, *hi))),
+        math.dist(lo, hi),
+        time.perf_counter() - began,
+        index.figures.get("T_B", 0.0),
+    )
 
 
 def _contents(index):
     """Kind of primitive -> number; and structures inside instances -> number of instances."""
     if isinstance(index.primitives, list):
-        return (Counter(p.KIND for p in index.primitives), Counter(p.inner for p in index.primitives if p.KIND == "instance"))
+        return (
+            Counter(p.KIND for p in index.primitives),
+            Counter(p.inner for p in index.primitives if p.KIND == "instance"),
+        )
     kinds = index.primitives.kinds
-    return (Counter({k.KIND: k.n for k in kinds}),
-            Counter({s: int(number) for k in kinds if k.KIND == "instance" for s, number in zip(k.structures, np.bincount(k.which))}))
+    return (
+        Counter({k.KIND: k.n for k in kinds}),
+        Counter(
+            {
+                s: int(number)
+                for k in kinds
+                if k.KIND == "instance"
+                for s, number in zip(k.structures, np.bincount(k.which))
+            }
+        ),
+    )
 
 
 def _measured_boxes(index):
@@ -147,7 +177,7 @@ def _measured_boxes(index):
         lo, hi = np.array([[q.lo for q in p], [q.hi for q in p]])
     else:
         lo, hi = p.lo, p.hi
-    if n > SAMPLE:                                                          # ten times as fast as by rows
+    if n > SAMPLE:  # ten times as fast as by rows
         first, last = np.array([column.min() for column in lo.T]), np.array([column.max() for column in hi.T])
     else:
         first, last = lo.min(axis=0), hi.max(axis=0)
@@ -159,12 +189,12 @@ def _measured_boxes(index):
     width = size / resolution
     weight = n / len(lo)
     box = _half_area(size)
-    if not box > 0.0:                                                       # all on one line: every line meets all
+    if not box > 0.0:  # all on one line: every line meets all
         return Measures(all=n, pierced=n, nodes=2.0 * n, listed=n, crowd=n), first.tolist(), last.tolist()
     area = _half_area(edge.T)
     if len(lo) == n:
         pierced = float(area.sum() / box)
-    else:                                   # a sample may miss the few large ones: of leaves, for c_GS counts inner nodes twice
+    else:  # a sample may miss the few large ones: of leaves, for c_GS counts inner nodes twice
         pierced = 2.0 * index.figures["c_SAH"] - index.figures["c_GS"]
     # How many primitives have their middle in the same cell; cells that share a number are few, and far apart.
     with np.errstate(all="ignore"):
@@ -175,8 +205,19 @@ def _measured_boxes(index):
     grown = pierced + float(weight * (_half_area((edge + width).T) - area).sum() / box)
     x, y, z = size
     planes = resolution[0] * y * z + resolution[1] * z * x + resolution[2] * x * y
-    return (Measures(1.0, n, pierced + 1.0, index.figures["c_SAH"] + math.log2(n + 1.0), float(planes / box), grown + crowd, crowd),
-            first.tolist(), last.tolist())
+    return (
+        Measures(
+            1.0,
+            n,
+            pierced + 1.0,
+            index.figures["c_SAH"] + math.log2(n + 1.0),
+            float(planes / box),
+            grown + crowd,
+            crowd,
+        ),
+        first.tolist(),
+        last.tolist(),
+    )
 
 
 def _half_area(edges):

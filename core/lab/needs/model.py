@@ -62,13 +62,15 @@ class Model:
 
     def per_ray(self, kind, measures, tests=None):
         """N_IT, N_TS and seconds of a ray; `tests` are Tests, where there are other primitives than triangles."""
-        own = kind if (kind, "n_it") in self.counts else next(iter(self.counts))[0]     # none was there to be measured
-        n_it, n_ts = (factor * getattr(measures, measure) for measure, factor in (self.counts[own, c] for c in ("n_it", "n_ts")))
+        own = kind if (kind, "n_it") in self.counts else next(iter(self.counts))[0]  # none was there to be measured
+        n_it, n_ts = (
+            factor * getattr(measures, measure) for measure, factor in (self.counts[own, c] for c in ("n_it", "n_ts"))
+        )
         test = tests.triangles * self.ns[1] + (1.0 - tests.triangles) * tests.pair if tests else self.ns[1]
         return n_it, n_ts, self.ns[0] + test * n_it + self.ns[2] * n_ts
 
     def per_batch(self, tests=None, triangles=0.0):
-        """Seconds of a batch of rays, however few; `triangles`: what one with a single call takes where there are only these."""
+        """Seconds of a batch of rays, however few; `triangles`: what one with a single call takes among these."""
         return self.wave + (self.rounds * max(tests.call - triangles, 0.0) if tests else 0.0)
 
 
@@ -97,7 +99,7 @@ def fit(name, core, ground, brute):
         lazies.append(0.0)
         for batch in (batch for batch in batches if batch.kind in row.rays):
             few = batch.take(slice(0, fewer))
-            if row.family == "directional":                             # lists that are made when the first rays come
+            if row.family == "directional":  # lists that are made when the first rays come
                 first, again = (_asked(index, few) for _ in range(2))
                 lazies[-1] += max(first - again, 0.0)
             with _calls(index) as calls:
@@ -123,17 +125,30 @@ def fit(name, core, ground, brute):
         ray, test = _not_negative(np.stack([np.ones_like(n_it), n_it], axis=1), seconds)
         return Model(power(builds), fitted, (ray, test, 0.0), wave=median(waves), rounds=median(rounds))
     test = brute.ns[1]
-    ray, step = _not_negative(np.stack([np.ones_like(n_ts), n_ts], axis=1) / seconds[:, None], 1.0 - test * n_it / seconds, relative=False)
+    ray, step = _not_negative(
+        np.stack([np.ones_like(n_ts), n_ts], axis=1) / seconds[:, None], 1.0 - test * n_it / seconds, relative=False
+    )
     ratio = (ray + test * n_it + step * n_ts) / seconds
-    return Model(power(builds), fitted, (ray, test, step), power(lazies), row.rays == ("shadow",), wave=median(waves),
-                 rounds=median(rounds), off=float(np.exp(np.sqrt(np.mean(np.log(ratio) ** 2)))))
+    return Model(
+        power(builds),
+        fitted,
+        (ray, test, step),
+        power(lazies),
+        row.rays == ("shadow",),
+        wave=median(waves),
+        rounds=median(rounds),
+        off=float(np.exp(np.sqrt(np.mean(np.log(ratio) ** 2)))),
+    )
 
 
 def _followed(counts):
     """Of one count, for each kind of ray: the measure that it follows best on all scenes and kinds, and the factor."""
     best, least = {}, math.inf
     for measure in FOLLOWED:
-        logs = {key: np.log([(count + 0.01) / (getattr(m, measure) + 0.01) for m, count in rows]) for key, rows in counts.items()}
+        logs = {
+            key: np.log([(count + 0.01) / (getattr(m, measure) + 0.01) for m, count in rows])
+            for key, rows in counts.items()
+        }
         spread = sum(float(((values - values.mean()) ** 2).sum()) for values in logs.values())
         if spread < least - 1e-9:
             best, least = {key: (measure, float(np.exp(values.mean()))) for key, values in logs.items()}, spread
@@ -162,16 +177,18 @@ def _calls(index):
         yield calls
         return
     for name in ("intersect", "blocks"):
+
         def called(*arguments, _own=getattr(primitives, name)):
             calls.append(None)
             return _own(*arguments)
-        setattr(primitives, name, called)                               # of this one, not of its class
+
+        setattr(primitives, name, called)  # of this one, not of its class
     yield calls
     del primitives.intersect, primitives.blocks
 
 
 def _timed(index, batch, few, n_it):
-    """Seconds of a ray, and those that do not grow with the number of rays; uncounted, for rays may then go other ways."""
+    """Seconds of a ray, and those of a batch however few; uncounted, for rays may then go other ways."""
     less = _asked(index, few)
     more = min(len(batch), int(TESTS / max(n_it, 1.0)))
     if more < 2 * len(few):

@@ -62,12 +62,19 @@ def plan(scene, size=(640, 480), samples=1, depth=5, core="fast"):
         When there is nothing to trace.
     """
     if not scene.n_primitives:
-        raise RayscopeError(f"{scene.name}: there is nothing to trace: no object with a surface. Add a mesh, or check what is hidden in renders.")
+        raise RayscopeError(
+            f"{scene.name}: there is nothing to trace: no object with a surface. "
+            "Add a mesh, or check what is hidden in renders."
+        )
     index = build(scene, STANDARD, core)
     seen = survey(scene, index)
     rays = expected_rays(seen, size[0] * size[1], samples, depth, glance(scene, index))
     tests = tests_of(index)
     choice, rows = choose(seen, rays, core, expected_calls(seen, rays, depth), tests)
     left = left_out(scene, seen, tests, rays, choice, rows, core, size, samples, depth)
-    tried = {kind: [name for name, _ in some[1:]] for kind, some in contenders(choice, rows).items()} if core == "fast" else {}
+    tried = (
+        {kind: [name for name, _ in some[1:]] for kind, some in contenders(choice, rows).items()}
+        if core == "fast"
+        else {}
+    )
     return Plan(seen, rays, choice, rows, left, precision(seen), tried)

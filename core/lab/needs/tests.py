@@ -1,4 +1,4 @@
-"""What testing the primitives at hand takes: a sphere is not a triangle, and each Boolean combination has its own tree."""
+"""What testing the primitives at hand takes: a sphere is no triangle, and each Boolean combination has its own tree."""
 
 import time
 from dataclasses import dataclass
@@ -53,18 +53,24 @@ def tests_of(index):
         numbers = {name: np.flatnonzero(of == name) for name in dict.fromkeys(of.tolist())}
         lo, hi = np.array([p.lo for p in primitives]), np.array([p.hi for p in primitives])
     else:
-        numbers = {k.KIND: np.arange(*primitives.starts[i:i + 2]) for i, k in enumerate(primitives.kinds)}
+        numbers = {k.KIND: np.arange(*primitives.starts[i : i + 2]) for i, k in enumerate(primitives.kinds)}
         lo, hi = primitives.lo, primitives.hi
     if set(numbers) <= set(FITTED):
         return None
     x, y, z = (hi - lo).T
-    area = x * y + y * z + z * x + 1e-300                                   # a point has none
+    area = x * y + y * z + z * x + 1e-300  # a point has none
     share = {name: float(area[own].sum() / area.sum()) for name, own in numbers.items()}
-    seconds = {name: _seconds(primitives, lo, hi, own, name, "pure" if pure else "fast") for name, own in numbers.items() if name != "instance"}
+    seconds = {
+        name: _seconds(primitives, lo, hi, own, name, "pure" if pure else "fast")
+        for name, own in numbers.items()
+        if name != "instance"
+    }
     others = {name: pair for name, (pair, _) in seconds.items() if name not in FITTED}
-    return Tests(sum(share[name] for name in FITTED if name in share),
-                 sum(share[name] * pair for name, pair in others.items()) / max(sum(share[name] for name in others), 1e-300),
-                 sum(call for _, call in seconds.values()))
+    return Tests(
+        sum(share[name] for name in FITTED if name in share),
+        sum(share[name] * pair for name, pair in others.items()) / max(sum(share[name] for name in others), 1e-300),
+        sum(call for _, call in seconds.values()),
+    )
 
 
 def _seconds(primitives, lo, hi, own, name, core):
@@ -76,10 +82,12 @@ def _seconds(primitives, lo, hi, own, name, core):
     rng = np.random.default_rng(0)
     away = rng.normal(size=(many, 3))
     middle, edge = 0.5 * (lo[item] + hi[item]), hi[item] - lo[item]
-    origins = middle + 3.0 * np.linalg.norm(edge, axis=1, keepdims=True) * away / np.linalg.norm(away, axis=1, keepdims=True)
+    origins = middle + 3.0 * np.linalg.norm(edge, axis=1, keepdims=True) * away / np.linalg.norm(
+        away, axis=1, keepdims=True
+    )
     directions = middle + (rng.random((many, 3)) - 0.5) * edge - origins
     timed = _numpy if core == "fast" else _one_by_one
-    timed(primitives, origins[:2], directions[:2], item[:2])                # the first call is slower
+    timed(primitives, origins[:2], directions[:2], item[:2])  # the first call is slower
     less, more = (timed(primitives, origins[:n], directions[:n], item[:n]) for n in (few, many))
     pair = max((more - less) / (many - few), 0.1 * more / many)
     found = pair, max(less - pair * few, 0.0)
@@ -91,6 +99,7 @@ def _seconds(primitives, lo, hi, own, name, core):
 def _numpy(primitives, origins, directions, item):
     """Seconds of tests at once."""
     from ...fast.rays import Rays
+
     rays, which = Rays.checked(origins, directions, 0.0, np.inf)
     start = time.thread_time()
     primitives.intersect(rays, np.arange(rays.n), item[which], rays.t_max)
@@ -100,6 +109,7 @@ def _numpy(primitives, origins, directions, item):
 def _one_by_one(primitives, origins, directions, item):
     """Seconds of tests, one after the other."""
     from ...pure.ray import Ray
+
     rays = [Ray(o, d) for o, d in zip(origins.tolist(), directions.tolist())]
     start = time.thread_time()
     for ray, k in zip(rays, item):
