@@ -298,6 +298,18 @@ def test_light_buffers_within_limits(core, max_bytes, resolution):
 
 
 @pytest.mark.parametrize("core", CORES)
+def test_what_does_not_fit_is_told_with_the_picture(core):
+    from rayscope.core import trace
+    scene = jittered_sphere(np.random.default_rng(0))
+    scene.camera = Camera.look_at((0.5, -5.0, 1.5), (0.0, 0.0, 0.0))
+    scene.lights = [Light(f"lamp {k}", "point", (20.0,) * 3, position=(2.0 * k - 8.0, -3.0, 4.0)) for k in range(9)]
+    result = trace(scene, core=core, size=(8, 6), depth=0, shadow=("light-buffer", {"max_bytes": 1e3}))
+    named = [n.name for n in result.notices if "max_bytes" in n.text]
+    assert named == [f"lamp {k}" for k in range(len(named))] and len(named) == 5
+    assert np.array_equal(result.image, trace(scene, core=core, size=(8, 6), depth=0).image)
+
+
+@pytest.mark.parametrize("core", CORES)
 def test_pictures_with_directional_techniques_are_those_of_the_bvh(core):
     from rayscope.core import trace
     rng = np.random.default_rng(0)

@@ -22,6 +22,8 @@ BESIDE = 2.0**-46
 SHOWN, SHOWN_AWAY = 0.02, 0.25
 #: With more lights the cells of their buffers become fewer.
 FEW_LIGHTS = 16
+#: Lights, at most, of which it is told that their buffers do not fit.
+NAMED = 5
 #: A batch of rays whose light is not told is compared with so many lights.
 LIGHTS_TRIED = 16
 
@@ -124,7 +126,7 @@ class LightBuffer(Handing):
         cells, empty, entries, used = self._total.tolist()
         second = self._second.figures["memory"] if self._second is not None else 0
         self.figures.update(N_E=cells, N_EE=empty, N_ER=entries, memory=used + second)
-        if used > self.max_bytes and not any(n.name == self.lights[number].name for n in self.notices):
+        if used > self.max_bytes and len(self.notices) < NAMED and not any(n.name == self.lights[number].name for n in self.notices):
             self.notices.append(Notice(self.lights[number].name, f"its buffer takes {used} bytes, more than max_bytes = {self.max_bytes:g}, though "
                                        "its resolution was lowered. Raise max_bytes, or name another technique for shadow rays."))
 

@@ -24,6 +24,8 @@ SHOWN, SHOWN_AWAY = 0.02, 0.25
 LEVELS = 8
 #: A ray whose light is not told is compared with so many lights.
 LIGHTS_TRIED = 16
+#: Lights, at most, of which it is told that their buffers do not fit.
+NAMED = 5
 
 
 class LightBuffer(Handing):
@@ -115,7 +117,7 @@ class LightBuffer(Handing):
         self.figures.update(N_E=len(leaves), N_EE=sum(not c.entries for c in leaves), N_ER=sum(len(c.entries) for c in leaves),
                             memory=sum(self.bytes[k] for k in self.buffers) + (self._second.figures["memory"] if self._second else 0))
         name = self.lights[number].name
-        if self.bytes[number] > self.max_bytes and not any(n.name == name for n in self.notices):
+        if self.bytes[number] > self.max_bytes and len(self.notices) < NAMED and not any(n.name == name for n in self.notices):
             self.notices.append(Notice(name, f"its buffer takes {self.bytes[number]} bytes, more than max_bytes = {self.max_bytes:g}. "
                                        "Raise max_bytes, lower the resolution, or name another technique for shadow rays."))
 
