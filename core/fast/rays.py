@@ -126,8 +126,8 @@ class Rays:
 
     def main_of(self, ray):
         """The axes of :attr:`shear` where they are the same for some rays, else None."""
-        side = self.side[ray]
-        return tuple(AXES[:, side[0]].tolist()) if len(side) and (side == side[0]).all() else None
+        side = self.side[ray] if isinstance(ray, slice) else self.side.take(ray)
+        return tuple(AXES[:, side[0]].tolist()) if len(side) and side.min() == side.max() else None
 
     @cached_property
     def shear(self):

@@ -107,15 +107,12 @@ class Triangles:
             dx, dy, dz = (rays.d[k].take(ray) for k in main)
             sx, sy, sz = dx / dz, dy / dz, 1.0 / dz
             rows = self._flat.reshape(-1, 9).take(item, axis=0).T
-            corners = np.empty(rows.shape)
             if rays.apex is not None:
-                np.subtract(rows, np.array(rays.apex * 3)[:, None], out=corners)
+                rows = np.subtract(rows, np.array(rays.apex * 3)[:, None], out=np.empty(rows.shape))
             else:
-                for axis, o in enumerate(rays.o):
-                    o = o.take(ray)
-                    for k in (axis, axis + 3, axis + 6):
-                        np.subtract(rows[k], o, out=corners[k])
-            x, y, z = ([corners[k + vertex] for vertex in (0, 3, 6)] for k in main)
+                origin = [o.take(ray) for o in rays.o]
+                rows = [row - o for row, o in zip(rows, 3 * origin)]
+            x, y, z = ([rows[k + vertex] for vertex in (0, 3, 6)] for k in main)
         else:
             axes, origin, s = rays.shear
             sx, sy, sz = (c.take(ray) for c in s)
@@ -161,28 +158,28 @@ class Triangles:
             for c in z:
                 c *= sz                                                 # t of the vertices
             t = (u * z[0] + v * z[1] + w * z[2]) / det
-            # Seen at a grazing angle, or narrow: t may be off by more than is allowed.
-            area, loose = (column.take(item) for column in self.rounding)
-            distance = np.abs(t / sz)
-            bound = seen * (ALLOWED * np.maximum(distance, self.size) - distance)
-            some = np.flatnonzero((distance * area + loose > bound) & inside)
-            if len(some):
-                far, wide, lax, flat, scale = (column.take(some) for column in (distance, area, loose, seen, sz))
-                off = LOST * np.abs(scale) * (far + (far * wide + lax) / flat)
             if not any_hit:
                 v /= det
                 w /= det
         ends = rays.t_min.take(ray), t_far.take(ray)
+        # Seen at a grazing angle, or narrow: t may be off by more than is allowed. Most triangles are not, wherever they are met.
+        some = np.flatnonzero(~(seen >= self.rounding[2].take(item)) & inside)
         if len(some):
-            asked = Asked(*(end.take(some) for end in ends), any_hit)
-            open_ = ~asked.answered(t.take(some) - off, t.take(some) + off)
-            some, asked = some[open_], asked.take(open_)
+            area, loose = (column.take(item.take(some)) for column in self.rounding[:2])
+            scale, slope = np.abs(sz.take(some)), seen.take(some)
+            with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+                distance = np.abs(t.take(some) / scale)
+                bound, spread = slope * (ALLOWED * np.maximum(distance, self.size) - distance), distance * area + loose
+                off = LOST * scale * (distance + spread / slope)
+            asked, about = Asked(*(end.take(some) for end in ends), any_hit), t.take(some)
+            open_ = (spread > bound) & ~asked.answered(about - off, about + off)
+            some, asked, deep = some[open_], asked.take(open_), (loose > bound)[open_]
         if len(some):
             at, z = ray.take(some), [c.take(some) for c in z]
             low, high = np.minimum(np.minimum(z[0], z[1]), z[2]), np.maximum(np.maximum(z[0], z[1]), z[2])
             rows = self._flat.reshape(-1, 9).take(item.take(some), axis=0).T
             o, d = (taken(columns, at) for columns in (rays.o, rays.d))
-            t[some] = refined(o, d, rows, t.take(some), low, high, (loose > bound).take(some), asked)
+            t[some] = refined(o, d, rows, t.take(some), low, high, deep, asked)
         good = np.flatnonzero((t >= ends[0]) & (t <= ends[1]) & np.isfinite(t) & inside)
         if any_hit:
             return [good if pair is None else pair.take(good)]
@@ -200,17 +197,22 @@ class Triangles:
 
     @cached_property
     def rounding(self):
-        """What tells how far rounding may move t on each triangle, shape (2, n): see :func:`~rayscope.core.scene.exact.rounding`."""
-        found = np.empty((2, self.n))
+        """What tells how far rounding may move t on each triangle, shape (3, n): see :func:`~rayscope.core.scene.exact.rounding`.
+
+        The third is twice the area as the ray sees it from which on it moves t no more than is allowed, wherever that is.
+        """
+        found = np.empty((3, self.n))
         for first in range(0, self.n, PAIRS):
             some = slice(first, first + PAIRS)
             a, b, c = self.xyz[0:3, some], self.xyz[3:6, some], self.xyz[6:9, some]
             e, f, g = b - a, c - a, c - b
-            with np.errstate(over="ignore", invalid="ignore"):
+            with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
                 extent = np.maximum(np.maximum(np.abs(e), np.abs(f)), np.abs(g)).max(axis=0)
                 x, y, z = e[1] * f[2] - e[2] * f[1], e[2] * f[0] - e[0] * f[2], e[0] * f[1] - e[1] * f[0]
                 area = np.sqrt(x * x + y * y + z * z)
-                found[:, some] = area, extent * (area + extent * extent)
+                loose = extent * (area + extent * extent)
+                # With D, the distance, or the size if that is more: D area + loose <= seen (ALLOWED - 1) D.
+                found[:, some] = area, loose, (area + loose / self.size) * ((1.0 + 2.0**-40) / (ALLOWED - 1.0))
         return found
 
     def _collinear(self, item):
@@ -234,7 +236,7 @@ class Triangles:
                 some = slice(first, first + PAIRS)
                 self._table[:, some] = normals(self.xyz[:, some], self.flip[some] if self.flips else None)
         if self._table is not None:
-            return np.stack([column.take(item) for column in self._table])
+            return taken(self._table, item)
         self._singly += len(item)
         return normals(rows, self.flip[item] if self.flips else None)
 
@@ -320,10 +322,14 @@ def interpolated(rows, u, v):
     """Points of triangles (nine rows) with weights u, v of the second and third vertex: columns (3, m), and error bounds."""
     point, error = np.empty((3, len(u))), np.zeros(len(u))
     w = 1.0 - u - v
-    for axis in range(3):
-        a, b, c = w * rows[axis], u * rows[axis + 3], v * rows[axis + 6]
-        np.add(a + b, c, out=point[axis])
-        np.maximum(error, np.abs(a) + np.abs(b) + np.abs(c), out=error)
+    for axis, p in enumerate(point):
+        parts = [weight * row for weight, row in zip((w, u, v), rows[axis::3])]
+        np.add(parts[0], parts[1], out=p)
+        p += parts[2]
+        size, *others = (np.abs(part, out=part) for part in parts)
+        for other in others:
+            size += other
+        np.maximum(error, size, out=error)
     error *= GAMMA_7
     return point, error
 
