@@ -79,12 +79,16 @@ class Closest:
 
     def keep(self, ray, item, t, u, v, detail):
         """Take over hits found elsewhere; several may belong to one ray."""
-        old_t, old_item = self.t.take(ray), self.item.take(ray)
-        # A hit at t_max itself counts, hence <= while there is no hit yet.
-        better = np.flatnonzero((t < old_t) | ((t == old_t) & ((old_item < 0) | (item < old_item))))
-        if not len(better):
-            return
-        if len(better) < len(ray):
+        old = self.t.take(ray)
+        better, equal = t < old, t == old
+        if equal.any():
+            # A hit at t_max itself counts, while there is no hit yet.
+            old = self.item.take(ray)
+            better |= equal & ((old < 0) | (item < old))
+        if not better.all():
+            better = np.flatnonzero(better)
+            if not len(better):
+                return
             ray, item, t, u, v, detail = (column.take(better) for column in (ray, item, t, u, v, detail))
         if (ray[1:] > ray[:-1]).all():                  # one pair a ray
             self.t[ray], self.item[ray], self.u[ray], self.v[ray], self.detail[ray] = t, item, u, v, detail

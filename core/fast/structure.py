@@ -11,7 +11,7 @@ from .primitives import Primitives
 from .query import Closest, Counts, Occluded
 from .rays import Rays
 
-#: Rays traced at a time: enough to amortise numpy's calls, few enough for the caches.
+#: Rays traced at a time, as a rule: enough to amortise numpy's calls, few enough for the caches.
 BATCH = 131_072
 #: Hits described at a time: columns that stay in the cache.
 SURFACES = 8_192
@@ -37,9 +37,12 @@ class Structure:
         What the build could not do as asked, a guard that stopped it, for example.
     follows : bool
         Whether it makes use of knowing which primitive a ray leaves.
+    batch : int
+        Rays traced at a time.
     """
 
     follows = False
+    batch = BATCH
 
     def __init__(self, primitives, parameters, progress=None):
         self.primitives, self.parameters = primitives, parameters
@@ -126,7 +129,9 @@ class Structure:
                 surface = self.primitives.surface(query.rays, found, query.item.take(found), t, u, v, query.detail.take(found))
                 hits.t[at] = query.rays.callers_t(t, found)
                 hits.u[at], hits.v[at] = u, v
-                hits.object[at], hits.primitive[at], hits.part[at], normal, point, hits.error[at] = surface
+                hits.object[at], hits.primitive[at], part, normal, point, hits.error[at] = surface
+                if part.any():
+                    hits.part[at] = part
                 for axis in range(3):                       # column by column, several times faster than rows at once
                     hits.normal[:, axis][at], hits.point[:, axis][at] = normal[:, axis], point[:, axis]
         return hits
@@ -167,8 +172,8 @@ class Structure:
         names = ("n_it", "n_ts", "n_ets", "n_eets")
         counts = {name: np.zeros(n, np.int64) for name in names} if count else {}
         parts = []
-        for start in range(0, rays.n if self.primitives.n else 0, BATCH):
-            batch = rays.take(slice(start, start + BATCH)) if rays.n > BATCH else rays
+        for start in range(0, rays.n if self.primitives.n else 0, self.batch):
+            batch = rays.take(slice(start, start + self.batch)) if rays.n > self.batch else rays
             for some, part in self.divide(batch):
                 query = question(self.primitives, part, Counts(part.n) if count else None)
                 self.traverse(part, query)
