@@ -9,7 +9,8 @@ could still be nearer, or is too near to an edge to be excluded, is tested too: 
 import numpy as np
 
 from ...hits import Cells
-from ..rays import BLOCK, blocks
+from ..rays import BLOCK, blocks, taken
+from ..structure import BATCH
 from .raster import Grid, spans
 from .second import Handing
 from .view import Footprints, View
@@ -18,14 +19,21 @@ from .view import Footprints, View
 TILE = 16
 #: Nearness that rays' hits lose in single precision, relative.
 LOSS = 2.0**-20
+#: Rays pass the window, from -1 to 1, within this.
+WINDOW = 1.0005
 #: Rows of pixels longer than this are not recognised.
 WIDEST = 16_384
+#: The bits of keys, see :func:`_keys`, that hold the footprint's number.
+FOOT = 0xFFFFFFFF
 #: Pairs of footprints and rays collected before they are tested.
-PAIRS = 262_144
+PAIRS = 393_216
 
 
 class ImageDirectory(Handing):
     """Footprints of all primitives in the camera's window."""
+
+    #: More than others trace at a time: for each batch all footprints are looked at.
+    batch = 2 * BATCH
 
     def build(self, progress):
         camera = getattr(self.scene, "camera", None)
@@ -58,37 +66,40 @@ class ImageDirectory(Handing):
             self.hand_over(rays, query)
             return
         u, v, along, own = self._seen(rays)
-        if len(own) < rays.n:
+        if own is not None:
             other = np.ones(rays.n, bool)
             other[own] = False
             self.hand_over(rays, query, np.flatnonzero(other))
-        if len(own):
+        if own is None or len(own):
             _Buffer(self.feet, rays, query, own, u, v, along, self.view.perspective).fill()
 
     def _seen(self, rays):
-        """Where rays pass the window, their length along the viewing axis, and which of them come from the camera."""
-        view, (u, v, z) = self.view, np.empty((3, rays.n))
-        own = np.empty(rays.n, bool)
+        """Where rays pass the window, their length along the viewing axis, and which of them come from the camera: None for all."""
+        view, seen = self.view, np.empty((3, rays.n))
+        own = np.ones(rays.n, bool)
+        at_eye, ahead = view.perspective and rays.apex == tuple(view.position), rays.t_min.min(initial=0.0) >= 0.0
         for some in blocks(rays.n):
-            o, d = rays.o[:, some], rays.d[:, some]
-            x, y, w = view.directions(d)
-            z[some] = w
-            good = w > 0.0
+            d, (u, v, w) = rays.d[:, some], seen[:, some]
+            with np.errstate(all="ignore"):
+                x, y, w[:] = np.matmul(view.rows, d)
+                if view.perspective:
+                    np.divide(x, w, out=u)
+                    np.divide(y, w, out=v)
+                    # Extremes tell at once, as a rule; NaN is neither.
+                    if at_eye and ahead and w.min() > 0.0 and -WINDOW <= min(u.min(), v.min()) <= max(u.max(), v.max()) <= WINDOW:
+                        continue
+            o, good = rays.o[:, some], w > 0.0
             if view.perspective:
-                if rays.apex != tuple(view.position):
-                    good &= (o[0] == view.position[0]) & (o[1] == view.position[1]) & (o[2] == view.position[2])
-                with np.errstate(all="ignore"):
-                    x, y = np.divide(x, w, out=u[some]), np.divide(y, w, out=v[some])
+                good &= (o[0] == view.position[0]) & (o[1] == view.position[1]) & (o[2] == view.position[2])
             else:
                 good &= np.abs(x) + np.abs(y) <= 2.0**-46 * view.scale * np.abs(d).max(axis=0)
-                u[some], v[some], start, _ = view.points(o)
-                x, y = u[some], v[some]
+                u[:], v[:], start, _ = view.points(o)
                 good &= np.abs(start) <= 2.0**-46 * view.scale * (np.abs(o).max(axis=0) + view.extra)
-            own[some] = good & (np.abs(x) <= 1.0005) & (np.abs(y) <= 1.0005) & (rays.t_min[some] >= 0.0)
+            own[some] = good & (np.abs(u) <= WINDOW) & (np.abs(v) <= WINDOW) & (rays.t_min[some] >= 0.0)
         if own.all():
-            return u, v, z, np.arange(rays.n)
+            return *seen, None
         own = np.flatnonzero(own)
-        return u[own], v[own], z[own], own
+        return *taken(seen, own), own
 
 
 class _Buffer:
@@ -96,17 +107,17 @@ class _Buffer:
 
     Attributes
     ----------
-    ray : ndarray
-        Numbers of the rays in the batch.
-    best : ndarray, uint64
-        Per ray, nearness and footprint of what is nearest, 0 for none.
+    ray : ndarray, or None
+        Numbers of the rays in the batch; None: all.
+    limit : ndarray, float32
+        Per ray, the nearness that a hit must have to matter.
     """
 
     def __init__(self, feet, rays, query, ray, u, v, along, perspective):
         self.feet, self.query, self.ray = feet, query, ray
         self.along, self.perspective = along, perspective
         self.u, self.v = u.astype(np.float32), v.astype(np.float32)
-        self.n = len(ray)
+        self.n = len(u)
         self.tiles = None
         self.grid, self.offset = pixel_grid(u, v)
         self.regular = self.grid is not None
@@ -118,14 +129,18 @@ class _Buffer:
             self.count = np.bincount(cell, minlength=self.grid.columns * self.grid.rows)
             self.start = np.cumsum(self.count) - self.count
         self.limit = np.full(self.n, 0.0 if perspective else -np.inf, np.float32)
-        near = np.flatnonzero(query.t[ray] < np.inf)
+        near = np.flatnonzero((query.t if ray is None else query.t.take(ray)) < np.inf)
         if len(near):
             self.limit[near] = self._limit(near)
+
+    def _own(self, ray):
+        """Numbers of some rays in the batch."""
+        return ray if self.ray is None else self.ray.take(ray)
 
     def _limit(self, which):
         """Nearness that a hit must have to matter to rays, with something to spare."""
         with np.errstate(all="ignore"):
-            z = self.query.t[self.ray[which]] * self.along[which]
+            z = self.query.t.take(self._own(which)) * self.along.take(which)
             if self.perspective:
                 return np.where(z >= 0.0, (1.0 - LOSS) / z, np.inf).astype(np.float32) * np.float32(1.0 - LOSS)
             limit = np.where(z > -np.inf, -z - LOSS * np.abs(z), np.inf)
@@ -146,14 +161,18 @@ class _Buffer:
             self._settle(pairs)
 
     def _settle(self, pairs):
-        """Test the nearest footprint of each ray, then all that may still matter; the rays that were tested."""
-        foot, ray, near = (np.concatenate(c) for c in zip(*pairs))
-        first = self._nearest(ray, near)
-        self._test(foot, ray, first)
-        near[first] = -np.inf
-        rest = np.flatnonzero(near > -np.inf)
-        self._test(foot, ray, rest[near.take(rest) >= self._limit(ray.take(rest))])
-        return ray.take(first)
+        """Test the nearest footprint of each ray, then all others that may still matter; the rays that were tested."""
+        ray, key = (np.concatenate(c) for c in zip(*pairs))
+        none = np.iinfo(np.int64).min
+        best = np.full(self.n, none)
+        np.maximum.at(best, ray, key)
+        met = np.flatnonzero(best > none)
+        self._test(met, best.take(met))
+        rest = np.flatnonzero(key < best.take(ray))
+        ray, key = ray.take(rest), key.take(rest)
+        keep = np.flatnonzero(_nearness(key) >= self._limit(ray))
+        self._test(ray.take(keep), key.take(keep))
+        return met
 
     def _hide(self):
         """Find out what tiles of cells hide: all whose nearness is less than what each ray in the tile has met."""
@@ -180,32 +199,24 @@ class _Buffer:
         least[(b > a + 1) | (d > c + 1)] = self.least
         return nearest < least
 
-    def _test(self, foot, ray, which):
+    def _test(self, ray, key):
         """Test pairs exactly."""
-        if not len(which):
+        if not len(ray):
             return
-        ray, item = ray.take(which), self.feet.item.take(foot.take(which))
-        own = self.ray.take(ray)
-        # Rays that run the same way are tested together: it is cheaper.
-        side = self.query.rays.side.take(own)
-        sides = np.flatnonzero(np.bincount(side))
-        for k in sides:
-            some = np.flatnonzero(side == k) if len(sides) > 1 else slice(None)
-            self.query.test(own[some], item[some])
-        if self.query.counts:
-            self.query.counts.steps(own)
-
-    def _nearest(self, ray, near):
-        """For each ray the pair of greatest nearness."""
-        best, rest = np.full(self.n, -1, np.int64), np.arange(len(ray))
-        # Of several for one ray the last is kept; those that are nearer try again.
-        while len(rest):
-            best[ray.take(rest)] = rest
-            rest = rest[near.take(rest) > near.take(best.take(ray.take(rest)))]
-        return best.take(np.flatnonzero(best >= 0))
+        query, own, item = self.query, self._own(ray), self.feet.item.take(key & FOOT)
+        if query.rays.main is not None:
+            query.test(own, item)
+        else:
+            # Rays that run the same way are tested together: it is cheaper.
+            side = query.rays.side.take(own)
+            for k in np.flatnonzero(np.bincount(side)):
+                some = np.flatnonzero(side == k)
+                query.test(own.take(some), item.take(some))
+        if query.counts:
+            query.counts.steps(own)
 
     def _pairs(self):
-        """Yield (footprints, rays, nearness) that may meet."""
+        """Yield rays and keys of footprints that may meet."""
         feet = self.feet
         for foot, cell in spans(feet, self.grid, self.hidden):
             if self.regular:
@@ -232,7 +243,24 @@ class _Buffer:
             if self.tiles is not None:
                 keep = np.flatnonzero(near >= self.limit.take(ray))
                 foot, ray, near = foot.take(keep), ray.take(keep), near.take(keep)
-            yield foot, ray, near
+            yield ray, _keys(near, foot)
+
+
+def _keys(near, foot):
+    """Nearness (float32) and numbers of footprints as one whole number each, in the order of nearness."""
+    # Bits of floats are in order but for the sign.
+    bits = near.view(np.int32)
+    bits = bits ^ (bits >> 31 & 0x7FFFFFFF)
+    key = bits.astype(np.int64)
+    key <<= 32
+    key |= foot
+    return key
+
+
+def _nearness(key):
+    """The nearness in keys."""
+    bits = (key >> 32).astype(np.int32)
+    return (bits ^ (bits >> 31 & 0x7FFFFFFF)).view(np.float32)
 
 
 def inside(feet, foot, u, v):

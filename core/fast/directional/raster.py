@@ -70,79 +70,72 @@ def spans(feet, grid, hidden=None):
     high = one(grid.half_v / grid.dv + 2.0**-10 + grid.rows * 2.0**-20)
     half_v = one(grid.half_v + grid.dv * (2.0**-10 + grid.rows * 2.0**-20))
     last_i, last_j = one(grid.columns - 1), one(grid.rows - 1)
-    # Beyond these no row is near.
-    v_lo, v_hi = one(grid.v0 - grid.dv), one(grid.v0 + grid.rows * grid.dv)
 
     def column(u, sign):
-        u = (u - one(grid.u0)) * per_u
-        return np.minimum(np.floor(u + wide), last_i) if sign > 0 else np.maximum(np.ceil(u - wide), one(0.0))
+        return _nearest(u, one(grid.u0), per_u, wide, last_i, sign)
 
     def row(v, sign):
-        v = (v - one(grid.v0)) * per_v
-        return np.minimum(np.floor(v + high), last_j) if sign > 0 else np.maximum(np.ceil(v - high), one(0.0))
+        return _nearest(v, one(grid.v0), per_v, high, last_j, sign)
 
     step = CHUNK // 2
     for first in range(0, len(feet), step):
         part = slice(first, first + step)
-        some = np.flatnonzero((feet.v_hi[part] >= v_lo) & (feet.v_lo[part] <= v_hi))
+        j0, j1 = row(feet.v_lo[part], -1), row(feet.v_hi[part], 1)
+        some = np.flatnonzero(j0 <= j1)
+        j0, j1 = j0.take(some), j1.take(some)
         some += first
         i0, i1 = column(feet.u_lo.take(some), -1), column(feet.u_hi.take(some), 1)
-        j0, j1 = row(feet.v_lo.take(some), -1), row(feet.v_hi.take(some), 1)
-        keep = np.flatnonzero((i0 <= i1) & (j0 <= j1))
+        keep = np.flatnonzero(i0 <= i1)
         some, i0, i1 = some.take(keep), i0.take(keep), i1.take(keep)
-        j0, j1 = j0.take(keep).astype(np.int32), j1.take(keep).astype(np.int32)
+        j0, j1 = j0.take(keep).astype(np.int64), j1.take(keep).astype(np.int64)
         mask = hidden(some, i0, i1, j0, j1) if hidden is not None and len(some) else None
         if mask is not None:
             keep = np.flatnonzero(~mask)
             some, i0, i1, j0, j1 = (c.take(keep) for c in (some, i0, i1, j0, j1))
-        heights = j1 - j0 + 1
-        for a, b in _pieces(heights, CHUNK // 4):
-            which, j = _expand(heights[a:b], j0[a:b])
-            which += a
+        for which, j in _expand(j1 - j0 + 1, j0, CHUNK // 4):
             foot = some.take(which)
-            v = (j * one(grid.dv) + one(grid.v0)).astype(np.float32)
-            left = right = None
-            for p, q, to in ((feet.p0, feet.q0, -1), (feet.p1, feet.q1, -1), (feet.p2, feet.q2, 1), (feet.p3, feet.q3, 1)):
+            v = j.astype(one)
+            v *= one(grid.dv)
+            v += one(grid.v0)
+            left, right = -np.inf, np.inf
+            for p, q, is_left in ((feet.p0, feet.q0, True), (feet.p1, feet.q1, True), (feet.p2, feet.q2, False), (feet.p3, feet.q3, False)):
                 q = q.take(foot)
                 u = q * v
                 u += p.take(foot)
                 np.abs(q, out=q)
                 q *= half_v
-                if to < 0:
-                    u -= q
-                    left = u if left is None else np.maximum(left, u, out=left)
+                if is_left:
+                    left = np.maximum(left, u - q)
                 else:
-                    u += q
-                    right = u if right is None else np.minimum(right, u, out=right)
+                    right = np.minimum(right, u + q)
             # Bounds of the footprint, again: an edge may be left out, or run far beyond its corners.
             left, right = np.maximum(column(left, -1), i0.take(which)), np.minimum(column(right, 1), i1.take(which))
             keep = np.flatnonzero(left <= right)
-            foot, left, start = foot.take(keep), left.take(keep).astype(np.int32), j.take(keep).astype(np.int64) * grid.columns
-            width = right.take(keep).astype(np.int32) - left + 1
-            for c, d in _pieces(width, CHUNK):
-                which, cell = _expand(width[c:d], left[c:d] + start[c:d])
-                which += c
+            foot, left, right = foot.take(keep), left.take(keep).astype(np.int64), right.take(keep).astype(np.int64)
+            for which, cell in _expand(right - left + 1, left + j.take(keep) * grid.columns, CHUNK):
                 yield foot.take(which), cell
 
 
-def _pieces(count, most):
-    """Yield (a, b) such that count[a:b] adds up to `most` or less, or is a single number."""
-    n = len(count)
-    if not n:
-        return
-    ends = np.cumsum(count, dtype=np.int64)
-    a = 0
-    while a < n:
+def _nearest(x, start, per, slack, last, sign):
+    """Numbers (float32) of the first columns or rows that are not before x (sign -1), or of the last not behind it (1)."""
+    x = x - start
+    x *= per
+    if sign < 0:
+        x -= slack
+        return np.maximum(np.ceil(x, out=x), np.float32(0.0), out=x)
+    x += slack
+    return np.minimum(np.floor(x, out=x), last, out=x)
+
+
+def _expand(count, start, most):
+    """Yield for each k count[k] entries (k, start[k]), (k, start[k] + 1), ..., up to `most` at a time, or those of a single k."""
+    ends, a = np.cumsum(count), 0
+    shift = start - (ends - count)
+    while a < len(count):
         before = ends[a - 1] if a else 0
         b = max(a + 1, int(np.searchsorted(ends, before + most, side="right")))
-        yield a, b
+        which = np.repeat(np.arange(a, b), count[a:b])
+        value = np.arange(before, ends[b - 1])
+        value += shift.take(which)
+        yield which, value
         a = b
-
-
-def _expand(count, start):
-    """For each k count[k] entries (k, start[k]), (k, start[k] + 1), ..."""
-    ends = np.cumsum(count)
-    which = np.repeat(np.arange(len(count)), count)
-    value = np.arange(int(ends[-1]) if len(ends) else 0)
-    value += (start - (ends - count)).take(which)
-    return which, value
