@@ -24,7 +24,7 @@ TRIM = 8 * 2.0**-40
 LOST = 16.0 * 2.0**-52
 #: Pairs tested together: columns that stay in the cache.
 PAIRS = 8_192
-#: Least share of hits with which it is not worth to go on with these alone.
+#: Share of hits below which it is worth while to go on with these alone.
 WORTH = 0.75
 
 
@@ -101,6 +101,39 @@ class Triangles:
 
     def _hits(self, rays, ray, item, t_far, any_hit):
         """As :meth:`intersect`, all pairs at once."""
+        x, y, z, sz = self._sheared(rays, ray, item)
+        u = x[2] * y[1] - y[2] * x[1]
+        v = x[0] * y[2] - y[0] * x[2]
+        w = x[1] * y[0] - y[1] * x[0]
+        # All of one sign, zeros allowed.
+        inside = (np.minimum(np.minimum(u, v), w) >= 0.0) | (np.maximum(np.maximum(u, v), w) <= 0.0)
+        pair = None
+        if np.count_nonzero(inside) < WORTH * len(ray):
+            # Few: only these from here on.
+            pair, inside = np.flatnonzero(inside), True
+            u, v, w, sz, ray, item = (c.take(pair) for c in (u, v, w, sz, ray, item))
+            x, y, z = ([column.take(pair) for column in axis] for axis in (x, y, z))
+        det = u + v + w
+        seen = np.abs(det)
+        self._mend_edges(item, x, y, (u, v, w, det), seen, inside)
+        with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+            for c in z:
+                c *= sz                                                 # t of the vertices
+            t = (u * z[0] + v * z[1] + w * z[2]) / det
+            if not any_hit:
+                v /= det
+                w /= det
+        ends = rays.t_min.take(ray), t_far.take(ray)
+        self._mend_t(rays, ray, item, t, z, sz, seen, inside, Asked(*ends, any_hit))
+        good = np.flatnonzero((t >= ends[0]) & (t <= ends[1]) & np.isfinite(t) & inside)
+        if any_hit:
+            return [good if pair is None else pair.take(good)]
+        if len(good) < len(ray):
+            t, v, w = t.take(good), v.take(good), w.take(good)
+        return good if pair is None else pair.take(good), t, v, w, np.zeros(len(good), np.int64)
+
+    def _sheared(self, rays, ray, item):
+        """Where rays see the vertices when they run from the origin along the third axis: x, y, z, three columns each, and Sz."""
         main = rays.main or rays.main_of(ray)
         if main is not None:
             # One order of the axes: whole triangles are fetched at once, and the shear is cheaper made anew.
@@ -123,20 +156,10 @@ class Triangles:
         for p, q, w in zip(x, y, z):
             p -= sx * w
             q -= sy * w
-        u = x[2] * y[1] - y[2] * x[1]
-        v = x[0] * y[2] - y[0] * x[2]
-        w = x[1] * y[0] - y[1] * x[0]
-        # All of one sign, zeros allowed.
-        inside = (np.minimum(np.minimum(u, v), w) >= 0.0) | (np.maximum(np.maximum(u, v), w) <= 0.0)
-        pair = None
-        if np.count_nonzero(inside) < WORTH * len(ray):
-            # Few: only these from here on.
-            pair, inside = np.flatnonzero(inside), True
-            u, v, w, sz, ray, item = (c.take(pair) for c in (u, v, w, sz, ray, item))
-            x, y, z = ([column.take(pair) for column in axis] for axis in (x, y, z))
-        det = u + v + w
-        seen = np.abs(det)
-        # Seen edge-on, or hardly a triangle: the edge functions are little but rounding errors.
+        return x, y, z, sz
+
+    def _mend_edges(self, item, x, y, edges, seen, inside):
+        """Put the edge functions and their sum right where they are little but rounding errors: seen edge-on, or hardly a triangle."""
         largest = [np.maximum(np.maximum(np.abs(a[0]), np.abs(a[1])), np.abs(a[2])) for a in (x, y)]
         doubtful = np.flatnonzero((seen <= (6.0 * DOUBTFUL) * largest[0] * largest[1]) & inside)
         if len(doubtful):
@@ -146,46 +169,36 @@ class Triangles:
             doubtful, p, q = doubtful.take(some), *([column.take(some) for column in axis] for axis in (p, q))
             # No area to be hit, exactly: nothing needs to be calculated one by one.
             flat = (p[0] == p[1]) & (p[1] == p[2]) | (q[0] == q[1]) & (q[1] == q[2]) | self._collinear(item.take(doubtful))
-            for column in (u, v, w, det):
+            for column in edges:
                 column[doubtful[flat]] = 0.0
             doubtful = doubtful[~flat]
         if len(doubtful):
             own, p, q = item.take(doubtful), *([column[~flat] for column in axis] for axis in (p, q))
             exact = edge_functions(p, q, lambda i: self.xyz[:, own[i]].reshape(3, 3).tolist())
-            for column, value in zip((u, v, w, det), (*exact, exact[0] + exact[1] + exact[2])):
+            for column, value in zip(edges, (*exact, exact[0] + exact[1] + exact[2])):
                 column[doubtful] = value
-        with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-            for c in z:
-                c *= sz                                                 # t of the vertices
-            t = (u * z[0] + v * z[1] + w * z[2]) / det
-            if not any_hit:
-                v /= det
-                w /= det
-        ends = rays.t_min.take(ray), t_far.take(ray)
-        # Seen at a grazing angle, or narrow: t may be off by more than is allowed. Most triangles are not, wherever they are met.
+
+    def _mend_t(self, rays, ray, item, t, z, sz, seen, inside, asked):
+        """Put t right where it may be off by more than is allowed: seen at a grazing angle, or narrow; as far as that matters."""
+        # Most triangles are never so, wherever they are met.
         some = np.flatnonzero(~(seen >= self.rounding[2].take(item)) & inside)
-        if len(some):
-            area, loose = (column.take(item.take(some)) for column in self.rounding[:2])
-            scale, slope = np.abs(sz.take(some)), seen.take(some)
-            with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-                distance = np.abs(t.take(some) / scale)
-                bound, spread = slope * (ALLOWED * np.maximum(distance, self.size) - distance), distance * area + loose
-                off = LOST * scale * (distance + spread / slope)
-            asked, about = Asked(*(end.take(some) for end in ends), any_hit), t.take(some)
-            open_ = (spread > bound) & ~asked.answered(about - off, about + off)
-            some, asked, deep = some[open_], asked.take(open_), (loose > bound)[open_]
-        if len(some):
-            at, z = ray.take(some), [c.take(some) for c in z]
-            low, high = np.minimum(np.minimum(z[0], z[1]), z[2]), np.maximum(np.maximum(z[0], z[1]), z[2])
-            rows = self._flat.reshape(-1, 9).take(item.take(some), axis=0).T
-            o, d = (taken(columns, at) for columns in (rays.o, rays.d))
-            t[some] = refined(o, d, rows, t.take(some), low, high, deep, asked)
-        good = np.flatnonzero((t >= ends[0]) & (t <= ends[1]) & np.isfinite(t) & inside)
-        if any_hit:
-            return [good if pair is None else pair.take(good)]
-        if len(good) < len(ray):
-            t, v, w = t.take(good), v.take(good), w.take(good)
-        return good if pair is None else pair.take(good), t, v, w, np.zeros(len(good), np.int64)
+        if not len(some):
+            return
+        area, loose = (column.take(item.take(some)) for column in self.rounding[:2])
+        scale, slope, asked, about = np.abs(sz.take(some)), seen.take(some), asked.take(some), t.take(some)
+        with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+            distance = np.abs(about / scale)
+            bound, spread = slope * (ALLOWED * np.maximum(distance, self.size) - distance), distance * area + loose
+            off = LOST * scale * (distance + spread / slope)
+        open_ = (spread > bound) & ~asked.answered(about - off, about + off)
+        some, asked, deep = some[open_], asked.take(open_), (loose > bound)[open_]
+        if not len(some):
+            return
+        at, z = ray.take(some), [c.take(some) for c in z]
+        low, high = np.minimum(np.minimum(z[0], z[1]), z[2]), np.maximum(np.maximum(z[0], z[1]), z[2])
+        rows = self._flat.reshape(-1, 9).take(item.take(some), axis=0).T
+        o, d = (taken(columns, at) for columns in (rays.o, rays.d))
+        t[some] = refined(o, d, rows, t.take(some), low, high, deep, asked)
 
     @cached_property
     def size(self):
