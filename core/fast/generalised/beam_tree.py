@@ -321,6 +321,8 @@ class BeamTree:
         sorted_ = self.lit.surface[order]
         world = self._in_world(self.lit)
         lo, hi = world.min(axis=1, initial=np.inf), world.max(axis=1, initial=-np.inf)
+        room = CLOSE * (np.abs(lo) + np.abs(hi))
+        lo, hi = lo - room, hi + room
         own = self._in_world(faces.take(known))
         own_lo, own_hi = own.min(axis=1, initial=np.inf), own.max(axis=1, initial=-np.inf)
         begin = np.searchsorted(sorted_, faces.surface[known])
@@ -330,17 +332,18 @@ class BeamTree:
         for start in range(0, len(which), PAIRS):
             self.check()
             a, b = which[start:start + PAIRS], order[at[start:start + PAIRS]]
+            for axis in range(3):
+                near = np.flatnonzero((own_lo[a, axis] <= hi[b, axis]) & (own_hi[a, axis] >= lo[b, axis]))
+                a, b = a[near], b[near]
             fragment = known[a]
             plane = self.plane[faces.surface[fragment]]
-            # On the side that is looked at, and not far off it.
+            # On the side that is looked at.
             same = (plane * source[faces.beam[fragment]]).sum(axis=1) * (plane * source[self.lit.beam[b]]).sum(axis=1) > 0.0
-            room = CLOSE * (np.abs(lo[b]) + np.abs(hi[b]))
-            near = ((own_lo[a] <= hi[b] + room) & (own_hi[a] >= lo[b] - room)).all(axis=1)
-            some = np.flatnonzero(same & near)
-            fragment, b = fragment[some], b[some]
-            turn = self.beams.hand[self.lit.beam[b]] * np.sign(self.beams.sight(self.lit.beam[b], plane[some]))
+            some = np.flatnonzero(same)
+            fragment, b, plane = fragment[some], b[some], plane[some]
+            turn = self.beams.hand[self.lit.beam[b]] * np.sign(self.beams.sight(self.lit.beam[b], plane))
             line, seen, _ = outlines(
-                self.beams, faces.beam[fragment], world[b], self.lit.count[b], plane[some], turn
+                self.beams, faces.beam[fragment], world[b], self.lit.count[b], plane, turn
             )
             points, count = faces.points[fragment], faces.count[fragment]
             d = distances(line, points)
