@@ -1,5 +1,7 @@
-"""What each object costs: a small picture is traced, and every intersection test of every ray (camera, mirror, glass, shadow) is
-booked to the object that it was made on; a ray's traversal steps are shared among the objects that it was tested against.
+"""What each object costs: a small picture is traced, and every intersection test of every ray (camera, mirror, glass,
+shadow) is
+booked to the object that it was made on; a ray's traversal steps are shared among the objects that it was tested
+against.
 """
 
 import numpy as np
@@ -16,9 +18,13 @@ class Ledger:
 
     def __init__(self, index, n_objects):
         self.n = n_objects
-        self.tests, self.hits, self.blocks = np.zeros((3, n_objects))   # blocks: shadow rays that they stop or let through
-        self.steps = np.zeros(n_objects + 1)                            # the last: of rays that are tested against nothing
-        self.object_of = np.concatenate([k.object_of for k in index.primitives.kinds]) if index.primitives.kinds else np.zeros(0, int)
+        # blocks: shadow rays that they stop or let through
+        self.tests, self.hits, self.blocks = np.zeros((3, n_objects))
+        # the last: of rays that are tested against nothing
+        self.steps = np.zeros(n_objects + 1)
+        self.object_of = np.concatenate([k.object_of
+                                         for k in index.primitives.kinds]) if index.primitives.kinds else np.zeros(0,
+                                                                                                                   int)
         self.of_primitive = np.zeros(index.primitives.n)
         self.rays = 0
         self.index = index
@@ -74,8 +80,10 @@ def measure(scene, technique="bvh", size=None, depth=5, progress=None, parameter
     Result
     """
     index = build(scene, technique, **(parameters or {}))
-    rendering = Rendering(scene, index=index, size=size or picture_size(scene), depth=depth, count=True, progress=progress)
-    ledger = Ledger(index, len(scene.objects))                          # from here: what is asked beforehand is no part of the picture
+    rendering = Rendering(scene, index=index, size=size or picture_size(scene), depth=depth, count=True,
+                          progress=progress)
+    # from here: what is asked beforehand is no part of the picture
+    ledger = Ledger(index, len(scene.objects))
     for _ in rendering.tiles():
         pass
     ledger.close()
@@ -92,13 +100,17 @@ def by_object(scene, ledger):
     total, steps, rows = float(ledger.tests.sum()) or 1.0, float(ledger.steps.sum()) or 1.0, {}
     for k, o in enumerate(scene.objects):
         if len(o.geometry):
-            row = rows.setdefault(o.name, {"object": o.name, "copies": 0, "primitives": 0, "tests": 0.0, "steps": 0.0, "hits": 0})
-            for name, value in (("copies", 1), ("primitives", len(o.geometry)), ("tests", ledger.tests[k] / total), ("steps", ledger.steps[k] / steps),
+            row = rows.setdefault(o.name,
+                                  {"object": o.name, "copies": 0, "primitives": 0, "tests": 0.0, "steps": 0.0,
+                                   "hits": 0})
+            for name, value in (("copies", 1), ("primitives", len(o.geometry)), ("tests", ledger.tests[k] / total),
+                                ("steps", ledger.steps[k] / steps),
                                 ("hits", int(ledger.hits[k]))):
                 row[name] += value
     for row in rows.values():
         row["tests_per_hit"] = row["tests"] * total / row["hits"] if row["hits"] else None
     found = sorted(rows.values(), key=lambda row: -(row["tests"] + row["steps"]))
     if ledger.steps[-1]:
-        found.append({"object": "(empty space)", "copies": 0, "primitives": 0, "tests": 0.0, "steps": ledger.steps[-1] / steps, "hits": 0})
+        found.append({"object": "(empty space)", "copies": 0, "primitives": 0, "tests": 0.0,
+                      "steps": ledger.steps[-1] / steps, "hits": 0})
     return found

@@ -23,7 +23,8 @@ class Finding:
     memory : float
         Bytes saved, about.
     same : bool
-        It is a finding only if the picture is the same with the remedy: what it concerns stopped shadow rays that others stop, too.
+        It is a finding only if the picture is the same with the remedy: what it concerns stopped shadow rays that
+        others stop, too.
     """
 
     objects: list

@@ -11,7 +11,8 @@ from ...scene.scene import Mesh, Object, Scene
 
 def without(*numbers):
     """A remedy: these objects are not there."""
-    return lambda scene: replace(scene, objects=[o for k, o in enumerate(scene.objects) if k not in numbers], notices=[])
+    return lambda scene: replace(scene, objects=[o for k, o in enumerate(scene.objects) if k not in numbers],
+                                 notices=[])
 
 
 def with_mesh(number, corners):
@@ -92,6 +93,6 @@ def halved(corners, which, rounds=3):
 def clustered(corners, edge):
     """Triangles whose corners were joined within cells of some size."""
     joined = np.round(corners / edge) * edge
-    kept = (joined[:, 0] != joined[:, 1]).any(axis=1) & (joined[:, 1] != joined[:, 2]).any(axis=1) & (joined[:, 2] != joined[:, 0]).any(axis=1)
+    kept = (joined != np.roll(joined, 1, axis=1)).any(axis=2).all(axis=1)
     joined = np.unique(joined[kept].reshape(-1, 9), axis=0).reshape(-1, 3, 3)
     return joined if len(joined) else corners[:1]

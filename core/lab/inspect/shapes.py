@@ -51,7 +51,8 @@ def boxes_of(scene, corners):
     for k, o in enumerate(scene.objects):
         if k not in boxes and len(o.geometry):
             others.setdefault(id(o.geometry), []).append(k)
-    for numbers in others.values():                                         # together: the geometry is looked through once
+    # together: the geometry is looked through once
+    for numbers in others.values():
         lo, hi = object_bounds([scene.objects[k] for k in numbers])
         boxes |= zip(numbers, zip(lo, hi))
     return {k: box for k, box in boxes.items() if np.isfinite(box).all()}

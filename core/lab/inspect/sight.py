@@ -37,11 +37,13 @@ def in_sight(scene, ledger, numbers):
         with np.errstate(divide="ignore", invalid="ignore"):
             x, y = x / depth, y / depth
     left, rightmost, bottom, top = camera.window
-    within = (depth > 0.0) & (x >= min(left, rightmost)) & (x <= max(left, rightmost)) & (y >= min(bottom, top)) & (y <= max(bottom, top))
+    within = (x >= min(left, rightmost)) & (x <= max(left, rightmost)) & (y >= min(bottom, top)) & (y <= max(bottom, top))
+    within &= depth > 0.0
     points, owner, away, depth = points[within], owner[within], away[within], depth[within]
     if not len(points):
         return set()
-    o, d = (np.broadcast_to(position, points.shape), away) if camera.kind == "perspective" else (points - depth[:, None] * forward, depth[:, None] * forward)
+    o, d = (np.broadcast_to(position, points.shape),
+            away) if camera.kind == "perspective" else (points - depth[:, None] * forward, depth[:, None] * forward)
     hits = ledger.index.closest(o, d)
     return set(owner[(hits.object == owner) & hits.hit].tolist())
 

@@ -5,9 +5,11 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ...scene.scene import Scene
-from .rays import (aimed_inside, axis_rays, bad_rays, cube_rays, few, from_nowhere, from_the_gap, from_the_middle, fuzzy_rays, grazing, in_the_plane, mixed_rays, one_ray, starts,
+from .rays import (aimed_inside, axis_rays, bad_rays, cube_rays, few, from_nowhere, from_the_gap, from_the_middle,
+                   fuzzy_rays, grazing, in_the_plane, mixed_rays, one_ray, starts,
                    to_lights, touching, window_rays, with_ends)
-from .scenes import (LOST, PBRT, blocks, copies, coplanar, corner_blocks, degenerate, far_vertex, fuzz, identical, lit, moved_ball, nested_boxes, random_soup, room_of_solids, shapes,
+from .scenes import (LOST, PBRT, blocks, copies, coplanar, corner_blocks, degenerate, far_vertex, fuzz, identical, lit,
+                     moved_ball, nested_boxes, random_soup, room_of_solids, shapes,
                      sheet, shells, slivers, solids_under_matrices, soup, spheres, stadium, star, tangent_spheres)
 
 TRIANGLES = frozenset({"triangle"})
@@ -29,7 +31,8 @@ class Case:
     instanced : bool
         Shared meshes stay instances, however small.
     inside : callable or None
-        ``inside(scene, rng, n)``: rays from within a scene that nothing leaves: what is spawned where they hit must hit again, and not
+        ``inside(scene, rng, n)``: rays from within a scene that nothing leaves: what is spawned where they hit must hit
+        again, and not
         where it started.
     from_one : int
         That many are spawned from one hit, besides those from all.
@@ -68,7 +71,8 @@ class Case:
     cores: tuple = ("pure", "fast")
 
 
-GUARDS = {"octree": {"max_depth": 18, "leaf_size": 1}, "kd-tree": {"max_depth": 64, "leaf_size": 1, "stop": "depth"}, "bsp-tree": {"max_depth": 64, "leaf_size": 1}}
+GUARDS = {"octree": {"max_depth": 18, "leaf_size": 1}, "kd-tree": {"max_depth": 64, "leaf_size": 1, "stop": "depth"},
+          "bsp-tree": {"max_depth": 64, "leaf_size": 1}}
 #: Hardly any memory: trees end early, and lists are given up and made again.
 LITTLE = {name: {"max_bytes": 1000.0} for name in ("light-buffer", "ray-coherence", "ray-classification")}
 LITTLE |= {name: {"max_bytes": 1000.0, "stop": "memory"} for name in ("octree", "kd-tree", "bsp-tree")}
@@ -99,8 +103,10 @@ def cases(full=False):
         Case("one", identical(1), mixed_rays),
         Case("two identical", identical(2), mixed_rays),
         Case("many identical", identical(100), mixed_rays, exact=False, parameters=GUARDS),
-        *([Case("million identical", identical(1_000_000), few, exact=False, cores=("fast",), varied=False, only=ONE_LEAF)] if full else []),
-        *([Case("thousand identical", identical(1000), mixed_rays, exact=False, parameters=GUARDS, varied=False)] if full else []),
+        *([Case("million identical", identical(1_000_000), few, exact=False, cores=("fast",), varied=False,
+                only=ONE_LEAF)] if full else []),
+        *([Case("thousand identical", identical(1000), mixed_rays, exact=False, parameters=GUARDS, varied=False)]
+          if full else []),
         Case("plane", sheet, axis_rays),
         Case("coplanar", coplanar, mixed_rays),
         Case("on a line", lambda rng: soup(rng.random((20, 3, 1)) * np.array([1.0, 2.0, -1.0])), mixed_rays),
@@ -112,37 +118,49 @@ def cases(full=False):
         Case("axes and diagonals", blocks, axis_rays),
         Case("coincident faces", blocks, mixed_rays),
         Case("closed mesh", moved_ball(rows=16 if full else 8), aimed_inside, inside=from_the_middle),
-        Case("closed mesh far away", moved_ball(offset=FAR, rows=16 if full else 8), aimed_inside, inside=from_the_middle),
-        *(Case(f"closed mesh{where}, {n:,} rays", moved_ball(offset=offset, rows=16), aimed_inside, n=n, cores=(core,), varied=False)
-          for where, offset in (("", (0, 0, 0)), (" far away", FAR)) for core, n in (("pure", 1500), ("fast", 100_000)) if full),
+        Case("closed mesh far away", moved_ball(offset=FAR, rows=16 if full else 8), aimed_inside,
+             inside=from_the_middle),
+        *(Case(f"closed mesh{where}, {n:,} rays", moved_ball(offset=offset, rows=16), aimed_inside, n=n, cores=(core,),
+               varied=False)
+          for where, offset in (("", (0, 0, 0)), (" far away", FAR))
+          for core, n in (("pure", 1500), ("fast", 100_000)) if full),
         Case("concave closed mesh", star, mixed_rays, inside=from_the_middle, from_one=10_000 if full else 100),
         Case("two shells 1e-6 apart", shells(1e-6), from_the_gap, inside=from_the_gap),
         Case("two shells 1e-12 apart", shells(1e-12), from_the_gap, inside=from_the_gap),
-        Case("collinear (pbrt)", lambda rng: soup([PBRT]), one_ray((-1113.45459 - 5.0, -79.0, -56.2431908), (1, -0.01, 0), "miss")),
-        Case("lost elsewhere", lambda rng: soup([LOST]), one_ray((-0.028221702575683627, -2.5058889150619503, 8), (-0.16852837373762, 0.9856968028990217, 0))),
-        *(Case(f"slivers 1e{k}", slivers(10.0**k), grazing, varied=k in (6, 12), sweep=("aspect", 10.0**k)) for k in thin),
+        Case("collinear (pbrt)", lambda rng: soup([PBRT]),
+             one_ray((-1113.45459 - 5.0, -79.0, -56.2431908), (1, -0.01, 0), "miss")),
+        Case("lost elsewhere", lambda rng: soup([LOST]),
+             one_ray((-0.028221702575683627, -2.5058889150619503, 8), (-0.16852837373762, 0.9856968028990217, 0))),
+        *(Case(f"slivers 1e{k}", slivers(10.0**k), grazing, varied=k in (6, 12), sweep=("aspect", 10.0**k))
+          for k in thin),
         *(Case(f"scale 1e{k}", moved_ball(10.0**k), aimed_inside, inside=from_the_middle, varied=abs(k) == 8,
                 sweep=("scale", 10.0**k)) for k in powers),
-        *(Case(f"distance 1e{k}", moved_ball(offset=(10.0**k, -(10.0**k), 3.0 * 10.0 ** (k - 1))), aimed_inside, inside=from_the_middle,
+        *(Case(f"distance 1e{k}", moved_ball(offset=(10.0**k, -(10.0**k), 3.0 * 10.0 ** (k - 1))), aimed_inside,
+               inside=from_the_middle,
                 varied=k == 8, sweep=("distance", 10.0**k)) for k in far),
         Case("triangles of 6e11", lambda rng: soup(6e11 * rng.normal(size=(20, 3, 3))), mixed_rays),
         Case("teapot in a stadium", stadium, aimed_inside, inside=from_the_middle, parameters=GUARDS),
         Case("little memory", blocks, mixed_rays, parameters=LITTLE),
         Case("large empty region", corner_blocks, from_nowhere),
         Case("matrices", copies, mixed_rays),
-        Case("solids under matrices", solids_under_matrices, mixed_rays, kinds=frozenset({"sphere", "box", "cylinder", "cone"}), exact=False, told=("flat",)),
+        Case("solids under matrices", solids_under_matrices, mixed_rays,
+             kinds=frozenset({"sphere", "box", "cylinder", "cone"}), exact=False, told=("flat",)),
         Case("instances", copies, mixed_rays, kinds=frozenset({"instance", "triangle"}), instanced=True, exact=False),
         Case("solids", shapes, starts, kinds=frozenset({"sphere", "box", "polygon", "cylinder", "cone"}), exact=False),
         Case("spheres", spheres(), mixed_rays, kinds=frozenset({"sphere"})),
-        Case("room of a box and a ball", room_of_solids, mixed_rays, kinds=frozenset({"sphere", "box"}), inside=from_the_middle),
+        Case("room of a box and a ball", room_of_solids, mixed_rays, kinds=frozenset({"sphere", "box"}),
+             inside=from_the_middle),
         Case("spheres far away", spheres(1.0, 1e6), mixed_rays, kinds=frozenset({"sphere"})),
         Case("random bits", fuzz, fuzzy_rays, exact=False, told=("Mesh",)),
         Case("seen edge-on", identical(30), in_the_plane),
         Case("direction cube and blocks", blocks, cube_rays),
         Case("direction cube and ball", moved_ball(), cube_rays),
-        Case("direction cube and solids", shapes, cube_rays, kinds=frozenset({"sphere", "box", "polygon", "cylinder", "cone"}), exact=False),
+        Case("direction cube and solids", shapes, cube_rays,
+             kinds=frozenset({"sphere", "box", "polygon", "cylinder", "cone"}), exact=False),
         Case("picture's pixels", lit, window_rays),
         Case("lights in odd places", lit, to_lights),
-        Case("four tangent spheres", lambda rng: Scene(solids=tangent_spheres()), touching, kinds=frozenset({"sphere"}), exact=False),
-        Case("solids with a face in common", lambda rng: Scene(solids=nested_boxes()), axis_rays, kinds=frozenset({"box"})),
+        Case("four tangent spheres", lambda rng: Scene(solids=tangent_spheres()), touching, kinds=frozenset({"sphere"}),
+             exact=False),
+        Case("solids with a face in common", lambda rng: Scene(solids=nested_boxes()), axis_rays,
+             kinds=frozenset({"box"})),
     ]

@@ -25,7 +25,8 @@ def differences(got, right, batch, size):
     wrong, lost, ghost : ndarray of bool
         Rays with another hit, none where there is one, one where there is none.
     errors : dict
-        The largest of t: t_error in units of EPSILON * max(|t|, size of the scene), t_ulp in those of its last place, t_relative.
+        The largest of t: t_error in units of EPSILON * max(|t|, size of the scene), t_ulp in those of its last place,
+        t_relative.
     """
     hit, expected = got.primitive >= 0, right.primitive >= 0
     both = hit & expected
@@ -33,8 +34,11 @@ def differences(got, right, batch, size):
     t, t0 = np.where(both, got.t, 0.0) * length, np.where(both, right.t, 0.0) * length
     with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
         apart = np.abs(t - t0)
-        error, ulp, relative = (np.where(apart > 0.0, apart / unit, 0.0) for unit in (EPSILON * np.maximum(np.abs(t0), size), np.spacing(np.abs(t0)), np.abs(t0)))
-    errors = {name: float(x.max(initial=0.0)) for name, x in (("t_error", error), ("t_ulp", ulp), ("t_relative", relative))}
+        error, ulp, relative = (np.where(apart > 0.0, apart / unit, 0.0)
+                                for unit in (EPSILON * np.maximum(np.abs(t0), size), np.spacing(np.abs(t0)),
+                                             np.abs(t0)))
+    errors = {name: float(x.max(initial=0.0))
+              for name, x in (("t_error", error), ("t_ulp", ulp), ("t_relative", relative))}
     return both & (error > T_BOUND / EPSILON), ~hit & expected, hit & ~expected, errors
 
 
@@ -53,9 +57,11 @@ def examine(case, scene, batch, right, name, core, seed, base=None, timed=True, 
     Returns
     -------
     dict
-        A row of the table; `bad`: numbers of the rays that failed, `bad_spawned`: some of the spawned ones, `seconds`, `steps`.
+        A row of the table; `bad`: numbers of the rays that failed, `bad_spawned`: some of the spawned ones, `seconds`,
+        `steps`.
     """
-    row = {"case": case.name, "technique": name, "core": core, "rays": len(batch), "wrong": 0, "lost": 0, "ghost": 0, "leaks": 0, "self_hits": 0,
+    row = {"case": case.name, "technique": name, "core": core, "rays": len(batch), "wrong": 0, "lost": 0, "ghost": 0,
+           "leaks": 0, "self_hits": 0,
            "t_error": 0.0, "parameters": parameters or {}, "bad": []}
     try:
         start = time.perf_counter()
@@ -98,7 +104,8 @@ def _timed(index, batch, core, base):
     rays = batch.take(np.resize(np.arange(len(batch)), TIMED[core]))
     counted = asked(rays, index, count=True)
     work = counted.n_it + counted.n_ts + 1
-    seconds = math.inf                                                  # of this thread: others may use the processor too
+    # of this thread: others may use the processor too
+    seconds = math.inf
     for _ in range(3):
         start = time.thread_time()
         with np.errstate(all="ignore"):

@@ -10,8 +10,10 @@ from ...errors import RayscopeError
 from ...rendering import Rendering
 from .pictures import pictures
 
-COLUMNS = ("case", "technique", "core", "pixels", "wrong", "not_finite", "brightest", "seconds", "slow", "work", "verdict")
-#: Part of the picture's largest value by which a pixel may differ. Near the critical angle rounding counts as its root does.
+COLUMNS = ("case", "technique", "core", "pixels", "wrong", "not_finite", "brightest", "seconds", "slow", "work",
+           "verdict")
+#: Part of the picture's largest value by which a pixel may differ. Near the critical angle rounding counts as its root
+#: does.
 SAME = 1e-6
 #: What surroundings of 1 may become by rounding in single precision.
 FULL = 1.0 + 1e-5
@@ -59,9 +61,11 @@ def examine(case, seed, name, core, right, base=None):
     dict
         A row of the table.
     """
-    row = {"case": case.name, "technique": name, "core": core, "pixels": case.side**2, "wrong": 0, "not_finite": 0, "bad": []}
+    row = {"case": case.name, "technique": name, "core": core, "pixels": case.side**2, "wrong": 0, "not_finite": 0,
+           "bad": []}
     picture, spent = traced(case, seed, name, core)
-    row |= spent | {"not_finite": int((~np.isfinite(picture)).any(axis=1).sum()), "brightest": float(np.nan_to_num(picture).max())}
+    row |= spent | {"not_finite": int((~np.isfinite(picture)).any(axis=1).sum()),
+                    "brightest": float(np.nan_to_num(picture).max())}
     failed = [f"{row['not_finite']} pixels are no numbers"] if row["not_finite"] else []
     if picture.min() < 0.0 or case.furnace and row["brightest"] > FULL:
         failed.append(f"light out of nothing: from {picture.min():.3g} to {row['brightest']:.3g}")
@@ -81,7 +85,8 @@ def examine(case, seed, name, core, right, base=None):
 def examined(case, seed, contestants, base, known):
     """Rows of one case for (technique, core) pairs; `base` and `known` are kept from one call to the next.
 
-    Ray by ray, every technique's picture is brute force's of the pure core. Cones, pyramids and beams see a pixel's area:
+    Ray by ray, every technique's picture is brute force's of the pure core. Cones, pyramids and beams see a pixel's
+    area:
     their pictures are held against their own of the core that comes first, and have no more energy than others.
     """
     rows, model = [], next(p for p in pictures() if p.name == case.like) if case.like else case
@@ -93,8 +98,10 @@ def examined(case, seed, contestants, base, known):
             row = examine(case, seed, name, core, known[key], base.get((name, core)))
         except RayscopeError:
             raise
-        except Exception as error:                                      # a technique that breaks is a finding, not our end
-            row = {"case": case.name, "technique": name, "core": core, "pixels": case.side**2, "bad": [], "verdict": f"broke: {type(error).__name__}: {error}"}
+        # a technique that breaks is a finding, not our end
+        except Exception as error:
+            row = {"case": case.name, "technique": name, "core": core, "pixels": case.side**2, "bad": [],
+                   "verdict": f"broke: {type(error).__name__}: {error}"}
         if case.name == "friendly picture" and "seconds" in row:
             base[name, core] = row
         rows.append(row)

@@ -34,16 +34,21 @@ def failure(row, seed, full):
     scene, batch = scene_and_rays(case, seed, case.n or RAYS[full])
     rays = [{"number": r, "o": [x.hex() for x in batch.o[r].tolist()], "d": [x.hex() for x in batch.d[r].tolist()],
              "t_min": batch.t_min[r].item().hex(), "t_max": batch.t_max[r].item().hex()} for r in row["bad"][:20]]
-    rays += [{"number": f"spawned {k}", "o": [x.hex() for x in ray["o"]], "d": [x.hex() for x in ray["d"]], "t_min": 0.0.hex(), "t_max": math.inf.hex(),
+    rays += [{"number": f"spawned {k}", "o": [x.hex() for x in ray["o"]], "d": [x.hex() for x in ray["d"]],
+              "t_min": 0.0.hex(), "t_max": math.inf.hex(),
               "leaving": ray["leaving"]} for k, ray in enumerate(row.get("bad_spawned", ()))]
-    return {"case": case.name, "full": full, "seed": seed, "technique": row["technique"], "core": row["core"], "parameters": row.get("parameters", {}),
+    return {"case": case.name, "full": full, "seed": seed, "technique": row["technique"], "core": row["core"],
+            "parameters": row.get("parameters", {}),
             "verdict": row["verdict"], "scene": checksum(scene), "rays": rays}
 
 
 def checksum(scene):
     """Of the numbers of a scene."""
-    parts = [p for o in scene.objects for p in (o.matrix, *((o.geometry.vertices, o.geometry.triangles) if isinstance(o.geometry, Mesh) else
-                                                             [s.matrix for s in o.geometry.solids if hasattr(s, "matrix")]))]
+    parts = [p for o in scene.objects for p in (o.matrix,
+                                                *((o.geometry.vertices, o.geometry.triangles)
+                                                  if isinstance(o.geometry, Mesh) else
+                                                             [s.matrix for s in o.geometry.solids
+                                                              if hasattr(s, "matrix")]))]
     return zlib.crc32(b"".join(np.ascontiguousarray(p).tobytes() for p in parts))
 
 
@@ -58,7 +63,8 @@ def replay(path, say=lambda line: None):
     Returns
     -------
     dict
-        rays : list of dict with `number`, `brute` and `found` (t and primitive of each), `blocked` as a shadow ray, `exact` t where
+        rays : list of dict with `number`, `brute` and `found` (t and primitive of each), `blocked` as a shadow ray,
+        `exact` t where
         the case has one; row : the case's row as it is now; failed : bool.
 
     Raises
@@ -74,13 +80,17 @@ def replay(path, say=lambda line: None):
         if saved["case"] in {c.name for c in pictures(saved["full"])}:
             return _replayed_picture(saved)
         case = next(c for c in cases(saved["full"]) if c.name == saved["case"])
-        rays = [[[float.fromhex(x) for x in ray[k]] for k in "od"] + [float.fromhex(ray[k]) for k in ("t_min", "t_max")] for ray in saved["rays"]]
+        rays = [[[float.fromhex(x) for x in ray[k]] for k in "od"] + [float.fromhex(ray[k])
+                                                                      for k in ("t_min", "t_max")]
+                for ray in saved["rays"]]
     except (ValueError, KeyError, TypeError, StopIteration):
-        raise SceneError(f"{path}: this is no failing case that `rayscope stability` has written; give one of the files in its folder failures.") from None
+        raise SceneError(f"{path}: this is no failing case that `rayscope stability` has written; "
+                         "give one of the files in its folder failures.") from None
     seed, full, name, core, parameters = (saved[k] for k in ("seed", "full", "technique", "core", "parameters"))
     scene, batch, right = given(case, seed, full)
     if checksum(scene) != saved["scene"]:
-        raise SceneError(f"{path}: the case {case.name!r} has changed since this was written; run `rayscope stability` again.")
+        raise SceneError(f"{path}: the case {case.name!r} has changed since this was written; "
+                         "run `rayscope stability` again.")
     say(f"{variant_text(name, parameters)} ({core}) on {case.name}: was {saved['verdict']}")
     brute, index = built(case, scene, "brute", case.cores[0]), built(case, scene, name, core, **parameters)
     lines, lists = [], corners_of(scene).tolist()
@@ -89,9 +99,11 @@ def replay(path, say=lambda line: None):
         one = Batch(*(np.array([x]) for x in numbers), must=batch.must, leaving=leaving)
         expected, got = asked(one, brute), asked(one, index)
         blocked = bool(index.occluded(one.o, one.d, t_min=one.t_min, t_max=one.t_max)[0])
-        true = exact.nearest(*numbers[:2], lists, *numbers[2:]) if case.exact and lists and leaving is None and np.isfinite(one.o).all() else None
+        known = case.exact and lists and leaving is None and np.isfinite(one.o).all()
+        true = exact.nearest(*numbers[:2], lists, *numbers[2:]) if known else None
         lines.append({"number": ray["number"], "brute": (float(expected.t[0]), int(expected.primitive[0])),
-                      "found": (float(got.t[0]), int(got.primitive[0])), "blocked": blocked, "exact": float(true[0]) if true else None})
+                      "found": (float(got.t[0]), int(got.primitive[0])), "blocked": blocked, "exact": float(true[0])
+                      if true else None})
     friendly = next(c for c in cases(full) if c.name == "friendly")
     scene_f, batch_f, right_f = given(friendly, seed, full)
     base = examine(friendly, scene_f, batch_f, right_f, name, core, seed)

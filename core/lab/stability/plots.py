@@ -7,7 +7,8 @@ from .. import report
 from .sweeps import between_mirrors, drift
 
 #: What the plots show over what; see `plots`.
-SWEEPS = {"scale": "scale of the scene", "distance": "distance from the origin, in sizes of the scene", "aspect": "length of slivers over their width"}
+SWEEPS = {"scale": "scale of the scene", "distance": "distance from the origin, in sizes of the scene",
+          "aspect": "length of slivers over their width"}
 #: Where 0 is drawn.
 FLOOR = 1e-3
 #: Techniques that are traced between two mirrors.
@@ -32,7 +33,8 @@ def curves(path, panels, x, y, title, limit=None):
     bool
         Whether there was anything to plot.
     """
-    panels = {name: {label: [(a, max(b, FLOOR)) for a, b in points if np.isfinite(b)] for label, points in lines.items()} for name, lines in panels.items()}
+    panels = {name: {label: [(a, max(b, FLOOR)) for a, b in points if np.isfinite(b)]
+                     for label, points in lines.items()} for name, lines in panels.items()}
     panels = {name: lines for name, lines in panels.items() if any(lines.values())}
     if not panels:
         return False
@@ -43,7 +45,8 @@ def curves(path, panels, x, y, title, limit=None):
         for k, (label, points) in enumerate((label, points) for label, points in lines.items() if points):
             # Curves without markers may lie on one another: the first are wider.
             marked = len(points) < 40
-            axes.plot(*zip(*sorted(points)), marker="os^Dv<>pPX*h"[k % 12] if marked else None, color=f"C{k % 10}", label=label,
+            axes.plot(*zip(*sorted(points)), marker="os^Dv<>pPX*h"[k % 12] if marked else None, color=f"C{k % 10}",
+                      label=label,
                       linestyle="-" if k < 10 else "--", linewidth=1.5 if marked else max(1.5, 5.0 - 1.75 * k))
         if limit:
             axes.axhline(limit, color="black", linestyle=":", label=f"limit: {limit:g}")
@@ -72,20 +75,26 @@ def plots(result, folder, say=lambda line: None):
 
     for sweep, label in SWEEPS.items():
         error, lost, slow = _over(result, sweep, values)
-        draw(f"error_{sweep}", {"": error}, label, "largest error of t, in 2^-52 max(|t|, size)", f"Error over {label}", limit=8.0)
-        draw(f"lost_{sweep}", {"": lost}, label, f"share of rays that lose their hit; none: {FLOOR:g}", f"Lost hits over {label}")
+        draw(f"error_{sweep}", {"": error}, label, "largest error of t, in 2^-52 max(|t|, size)", f"Error over {label}",
+             limit=8.0)
+        draw(f"lost_{sweep}", {"": lost}, label, f"share of rays that lose their hit; none: {FLOOR:g}",
+             f"Lost hits over {label}")
         draw(f"time_{sweep}", slow, label, "time over that of the friendly case", f"Time over {label}", limit=10.0)
     drifts = {}
     for walk in ("exact", "add", "subtract"):
         steps, errors = zip(*drift(walk))
         drifts[walk] = list(zip(steps, np.maximum.accumulate(errors)))  # the largest so far
-    draw("drift", {"": drifts}, "steps along a row of cells", "largest error of t so far, in 2^-52 of the row's length", "3D-DDA: drift")
+    draw("drift", {"": drifts}, "steps along a row of cells", "largest error of t so far, in 2^-52 of the row's length",
+         "3D-DDA: drift")
     depths = {name: between_mirrors(name) for name in MIRRORED}
     pace = {name: next(seconds for depth, seconds, _, _ in points if depth == 10) for name, points in depths.items()}
     label = "recursion depth between two facing mirrors"
-    draw("time_depth", {"": {name: [(d, seconds / pace[name]) for d, seconds, _, _ in points] for name, points in depths.items()}}, label,
+    draw("time_depth",
+         {"": {name: [(d, seconds / pace[name]) for d, seconds, _, _ in points] for name, points in depths.items()}},
+         label,
          "time of a ray over that at depth 10", "Time over recursion depth", limit=10.0)
-    draw("error_depth", {"": {name: [(d, error) for d, _, _, error in points] for name, points in depths.items()}}, label,
+    draw("error_depth", {"": {name: [(d, error) for d, _, _, error in points] for name, points in depths.items()}},
+         label,
          "largest error of a pixel, in 2^-24", "Error over recursion depth")
     return files
 

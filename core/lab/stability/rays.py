@@ -1,4 +1,5 @@
-"""Stiff and extreme rays: through vertices and edges, in planes, along axes, from surfaces, to lights; and rays that are none.
+"""Stiff and extreme rays: through vertices and edges, in planes, along axes, from surfaces, to lights; and rays that
+are none.
 
 Each function takes a scene, a random generator and about how many rays there should be, and returns a Batch.
 """
@@ -150,7 +151,8 @@ def from_the_middle(scene, rng, n):
 
 
 def from_the_gap(scene, rng, n):
-    """From between two shells, the first object's and the second's, whose vertices correspond: across the gap and along it."""
+    """From between two shells, the first object's and the second's, whose vertices correspond: across the gap and along
+    it."""
     inner, outer = (o.geometry for o in scene.objects)
     pick = inner.triangles[rng.integers(len(inner), size=n)]
     weight = rng.dirichlet((1.0, 1.0, 1.0), n)[..., None]
@@ -159,7 +161,8 @@ def from_the_gap(scene, rng, n):
 
 
 def with_ends(scene, rng, n):
-    """Rays that begin or end exactly where they meet the first triangle, or one float before or behind; beginning at -0.0, too."""
+    """Rays that begin or end exactly where they meet the first triangle, or one float before or behind; beginning at
+    -0.0, too."""
     batch, corners = mixed_rays(scene, rng, n), corners_of(scene).tolist()
     for r in range(len(batch)):
         met = nearest(batch.o[r].tolist(), batch.d[r].tolist(), corners)
@@ -176,7 +179,8 @@ def with_ends(scene, rng, n):
 
 
 def from_nowhere(scene, rng, n):
-    """From lattice points in and around a scene, those on planes of division among them, along axes and diagonals and to points near its corners."""
+    """From lattice points in and around a scene, those on planes of division among them, along axes and diagonals and
+    to points near its corners."""
     lo, hi = scene.bounds()
     o = lo + (hi - lo) * rng.integers(-1, 18, (n, 3)) / 16.0
     d = lo + (hi - lo) * rng.choice((0.0, 0.03, 0.0625, 0.95, 1.0), (n, 3)) - o
@@ -201,7 +205,8 @@ def grazing(scene, rng, n):
 
 def few(scene, rng, n):
     """Four rays, two of which hit the triangles of `identical`."""
-    return Batch([(0.2, 0.2, 5.0), (0.9, 0.9, 3.0), (0.1, 0.1, -2.0), (5.0, 5.0, 5.0)], [(0, 0, -1), (0, 0, -1), (0, 0, 1), (0, 0, 1)])
+    return Batch([(0.2, 0.2, 5.0), (0.9, 0.9, 3.0), (0.1, 0.1, -2.0), (5.0, 5.0, 5.0)],
+                 [(0, 0, -1), (0, 0, -1), (0, 0, 1), (0, 0, 1)])
 
 
 def one_ray(o, d, must=""):
@@ -210,7 +215,8 @@ def one_ray(o, d, must=""):
 
 def starts(scene, rng, n):
     """Inside solids, on their surfaces, outside pointing away, tangent."""
-    middle = np.array([(0, 0, 0), (0.75, 0, 0), (3, 0, 0), (2, 0, 0), (1, 0, 0), (2, 0.5, 0), (0, 3, 0), (0, -3, 0), (0, 0, -1.5), (0, 0, 5)], float)
+    middle = np.array([(0, 0, 0), (0.75, 0, 0), (3, 0, 0), (2, 0, 0), (1, 0, 0), (2, 0.5, 0), (0, 3, 0), (0, -3, 0),
+                       (0, 0, -1.5), (0, 0, 5)], float)
     o = middle[np.arange(n) % len(middle)]
     d = rng.normal(size=(n, 3))
     tangent = Batch([(-3, 1, 0), (-3, 0, 1), (-3, 0.5, 0), (1, 1, -5)], [(1, 0, 0), (1, 0, -0.0), (2, 0, 0), (0, 0, 1)])
@@ -221,7 +227,8 @@ def cube_rays(scene, rng, n):
     """Towards corners, edges and borders of cells of a direction cube, from borders of cells of the scene's box."""
     lo, hi = scene.bounds()
     centre = 0.5 * (lo + hi)
-    size = float((hi - lo).max())                                       # of the cube around it, whose halves are 5D cells
+    # of the cube around it, whose halves are 5D cells
+    size = float((hi - lo).max())
     o = centre + 0.5 * size * (rng.integers(-4, 5, (n, 3)) / 4.0)
     d = rng.integers(-2, 3, (n, 3)) / 2.0
     d[: n // 3] = np.sign(rng.random((n // 3, 3)) - 0.5)                # |dx| = |dy| = |dz|
@@ -242,7 +249,8 @@ def in_the_plane(scene, rng, n):
 
 
 def window_rays(scene, rng, n):
-    """From the camera through the corners of the pixels of its picture, those of the window among them, and from elsewhere."""
+    """From the camera through the corners of the pixels of its picture, those of the window among them, and from
+    elsewhere."""
     side = max(int(math.sqrt(n)) - 1, 2)
     y, x = np.indices((side + 1, side + 1))
     o, d = scene.camera.rays(x.ravel(), y.ravel(), (side, side))
@@ -257,7 +265,8 @@ def to_lights(scene, rng, n):
     o = (pick * (weight / weight.sum(axis=1, keepdims=True))[..., None]).sum(axis=1) + (0.0, 0.0, 1e-3)
     o[::4, 2] = 0.25
     lights = [scene.lights[k] for k in rng.integers(len(scene.lights), size=n)]
-    d = np.array([np.negative(light.direction) if light.kind == "sun" else np.subtract(light.position, p) for light, p in zip(lights, o)], float)
+    d = np.array([np.negative(light.direction) if light.kind == "sun" else np.subtract(light.position, p)
+                  for light, p in zip(lights, o)], float)
     # As far as a trifle before the light: what the light itself lies on does not shade it.
     return Batch(o, d, t_max=np.where([light.kind == "sun" for light in lights], math.inf, 1.0 - 2.0**-20))
 

@@ -1,4 +1,4 @@
-"""Stiff and extreme scenes: triangles without area, far away, on one another, in huge rooms; solids; lights in odd places.
+"""Stiff and extreme scenes: triangles without area, far away, on one another, in huge rooms; solids; odd lights.
 
 Each function takes a random generator, or returns a function that does.
 """
@@ -26,8 +26,12 @@ def random_soup(rng, n=40):
 
 def ball(rng, rows=8, jitter=0.02):
     """A closed mesh: a unit sphere whose vertices were moved at random."""
-    polar, around = np.meshgrid(np.linspace(0.0, math.pi, rows + 1)[1:-1], np.linspace(0.0, math.tau, rows, endpoint=False), indexing="ij")
-    ring = np.stack([np.sin(polar) * np.cos(around), np.sin(polar) * np.sin(around), np.cos(polar)], axis=-1).reshape(-1, 3)
+    polar, around = np.meshgrid(
+        np.linspace(0.0, math.pi, rows + 1)[1:-1], np.linspace(0.0, math.tau, rows, endpoint=False), indexing="ij"
+    )
+    ring = np.stack([np.sin(polar) * np.cos(around), np.sin(polar) * np.sin(around), np.cos(polar)], axis=-1).reshape(
+        -1, 3
+    )
     vertices = np.concatenate([ring, [(0.0, 0.0, 1.0), (0.0, 0.0, -1.0)]])
     vertices *= 1.0 + jitter * rng.normal(size=(len(vertices), 1))
     top, bottom, last, triangles = len(ring), len(ring) + 1, (rows - 2) * rows, []
@@ -75,19 +79,40 @@ def sheet(rng, n=6, z=0.25):
 
 def blocks(rng, n=3):
     """Cubes of triangles edge to edge: coincident faces, everything on planes of division."""
-    return soup(corners_of_blocks(np.stack(np.meshgrid(*[np.arange(n, dtype=float)] * 3, indexing="ij"), axis=-1).reshape(-1, 3)[::2]))
+    return soup(
+        corners_of_blocks(
+            np.stack(np.meshgrid(*[np.arange(n, dtype=float)] * 3, indexing="ij"), axis=-1).reshape(-1, 3)[::2]
+        )
+    )
 
 
 def corners_of_blocks(places):
     """Triangles of unit cubes."""
     corner = np.array([[i >> 2 & 1, i >> 1 & 1, i & 1] for i in range(8)], float)
-    faces = [(0, 1, 3), (0, 3, 2), (4, 6, 7), (4, 7, 5), (0, 4, 5), (0, 5, 1), (2, 3, 7), (2, 7, 6), (0, 2, 6), (0, 6, 4), (1, 5, 7), (1, 7, 3)]
+    faces = [
+        (0, 1, 3),
+        (0, 3, 2),
+        (4, 6, 7),
+        (4, 7, 5),
+        (0, 4, 5),
+        (0, 5, 1),
+        (2, 3, 7),
+        (2, 7, 6),
+        (0, 2, 6),
+        (0, 6, 4),
+        (1, 5, 7),
+        (1, 7, 3),
+    ]
     return np.concatenate([corner[np.array(faces)] + p for p in places])
 
 
 def corner_blocks(rng):
     """A cube of triangles in each corner of a large box: what lies between is one empty region."""
-    corners = corners_of_blocks(np.array([(0, 0, 0), (0, 0, 15), (0, 15, 0), (0, 15, 15), (15, 0, 0), (15, 0, 15), (15, 15, 0), (15, 15, 15)], float))
+    corners = corners_of_blocks(
+        np.array(
+            [(0, 0, 0), (0, 0, 15), (0, 15, 0), (0, 15, 15), (15, 0, 0), (15, 0, 15), (15, 15, 0), (15, 15, 15)], float
+        )
+    )
     return soup(corners)
 
 
@@ -101,8 +126,16 @@ def coplanar(rng):
     return soup(corners)
 
 
-PBRT = (-1113.45459, -79.049614, -56.2431908), (-1113.45459, -87.0922699, -56.2431908), (-1113.45459, -79.2090149, -56.2431908)
-LOST = (-1.3836679458618164, -4.480311870574951, 10), (3.9273109436035156, 5.897944450378418, 8), (-1.3836679458618164, -4.480311870574951, 8)
+PBRT = (
+    (-1113.45459, -79.049614, -56.2431908),
+    (-1113.45459, -87.0922699, -56.2431908),
+    (-1113.45459, -79.2090149, -56.2431908),
+)
+LOST = (
+    (-1.3836679458618164, -4.480311870574951, 10),
+    (3.9273109436035156, 5.897944450378418, 8),
+    (-1.3836679458618164, -4.480311870574951, 8),
+)
 
 
 def degenerate(rng):
@@ -159,21 +192,45 @@ def copies(rng):
 
 
 def shapes(rng):
-    """Solids inside one another and side by side, with a 144-gon that is not convex, once more with each corner twice."""
+    """Solids inside one another and side by side; a 144-gon that is not convex, and one with each corner twice."""
     angle = np.linspace(0.0, math.tau, 144, endpoint=False)
     radius = np.where(np.arange(144) % 2, 0.4, 0.9)
     gon = np.stack([radius * np.cos(angle), radius * np.sin(angle), np.full(144, -1.5)], axis=1)
-    some = [solids.sphere((0, 0, 0), 1.0), solids.sphere((0, 0, 0), 0.5), solids.box((2, -1, -1), (4, 1, 1)), solids.polygon(gon),
-            solids.cylinder((0, 3, -1), (0, 3, 1), 0.7), solids.cone((0, -3, -1), (0, -3, 1), 0.8), solids.sphere((2, 0, 0), 1.0), solids.polygon((gon + (0.0, 0.0, 5.0)).repeat(2, axis=0))]
-    return Scene([Object("shapes", Shapes(some)), Object("nothing", Mesh([], [])), Object("loose edges", Mesh(rng.random((4, 3)), []))])
+    some = [
+        solids.sphere((0, 0, 0), 1.0),
+        solids.sphere((0, 0, 0), 0.5),
+        solids.box((2, -1, -1), (4, 1, 1)),
+        solids.polygon(gon),
+        solids.cylinder((0, 3, -1), (0, 3, 1), 0.7),
+        solids.cone((0, -3, -1), (0, -3, 1), 0.8),
+        solids.sphere((2, 0, 0), 1.0),
+        solids.polygon((gon + (0.0, 0.0, 5.0)).repeat(2, axis=0)),
+    ]
+    return Scene(
+        [
+            Object("shapes", Shapes(some)),
+            Object("nothing", Mesh([], [])),
+            Object("loose edges", Mesh(rng.random((4, 3)), [])),
+        ]
+    )
 
 
 def solids_under_matrices(rng):
-    """One of each solid under a mirrored, a sheared, a large, a turned and a flat matrix; the flat one has to be left out."""
+    """One of each solid under a mirrored, a sheared, a large, a turned and a flat matrix, which has to be left out."""
     turn = np.linalg.qr(rng.normal(size=(3, 3)))[0]
-    linear = {"mirrored": np.diag([-1.0, 1.0, 1.0]), "sheared": [(1.0, 0.5, 0.0), (0.0, 1.0, -0.3), (0.0, 0.0, 0.8)], "large": -100.0 * np.eye(3), "turned": 0.3 * turn,
-              "flat": np.diag([1.0, 1.0, 0.0])}
-    some = [solids.sphere((0, 0, 0), 1.0), solids.box((1.5, -1, -1), (3.5, 1, 1)), solids.cylinder((0, 3, -1), (0, 3, 1), 0.7), solids.cone((0, -3, -1), (0, -3, 1), 0.8)]
+    linear = {
+        "mirrored": np.diag([-1.0, 1.0, 1.0]),
+        "sheared": [(1.0, 0.5, 0.0), (0.0, 1.0, -0.3), (0.0, 0.0, 0.8)],
+        "large": -100.0 * np.eye(3),
+        "turned": 0.3 * turn,
+        "flat": np.diag([1.0, 1.0, 0.0]),
+    }
+    some = [
+        solids.sphere((0, 0, 0), 1.0),
+        solids.box((1.5, -1, -1), (3.5, 1, 1)),
+        solids.cylinder((0, 3, -1), (0, 3, 1), 0.7),
+        solids.cone((0, -3, -1), (0, -3, 1), 0.8),
+    ]
     objects = []
     for k, (name, part) in enumerate(linear.items()):
         matrix = np.eye(4)
@@ -184,10 +241,22 @@ def solids_under_matrices(rng):
 
 #: What has to be refused when the scene is made, and the words that have to say why.
 REFUSED = {
-    "a negative index": (lambda rng: Mesh(rng.random((9, 3)), [(0, 1, 2), (3, -1, 5)], name="Suzanne"), ("Suzanne", "triangle 1", "-1")),
-    "an index out of range": (lambda rng: Mesh(rng.random((9, 3)), [(0, 1, 2), (3, 4, 9)], name="Suzanne"), ("Suzanne", "triangle 1", "9 vertices")),
-    "a huge index": (lambda rng: Mesh(rng.random((9, 3)), [(2**62, 1, 2)], name="Suzanne"), ("Suzanne", "triangle 0", "9 vertices")),
-    "indices that are no whole numbers": (lambda rng: Mesh(rng.random((9, 3)), [(0.0, math.nan, 2.0)], name="Suzanne"), ("Suzanne", "whole numbers")),
+    "a negative index": (
+        lambda rng: Mesh(rng.random((9, 3)), [(0, 1, 2), (3, -1, 5)], name="Suzanne"),
+        ("Suzanne", "triangle 1", "-1"),
+    ),
+    "an index out of range": (
+        lambda rng: Mesh(rng.random((9, 3)), [(0, 1, 2), (3, 4, 9)], name="Suzanne"),
+        ("Suzanne", "triangle 1", "9 vertices"),
+    ),
+    "a huge index": (
+        lambda rng: Mesh(rng.random((9, 3)), [(2**62, 1, 2)], name="Suzanne"),
+        ("Suzanne", "triangle 0", "9 vertices"),
+    ),
+    "indices that are no whole numbers": (
+        lambda rng: Mesh(rng.random((9, 3)), [(0.0, math.nan, 2.0)], name="Suzanne"),
+        ("Suzanne", "whole numbers"),
+    ),
     "one index in 32 of random bits": (lambda rng: bad_indices(rng), ("Suzanne", "vertex indices")),
 }
 
@@ -200,13 +269,28 @@ def bad_indices(rng):
 
 
 def spheres(scale=1.0, offset=0.0):
-    return lambda rng: Scene([Object("spheres", Shapes([solids.sphere(scale * c + offset, scale * r)
-                                                        for c, r in zip(rng.random((12, 3)), 0.05 + 0.15 * rng.random(12))]))])
+    return lambda rng: Scene(
+        [
+            Object(
+                "spheres",
+                Shapes(
+                    [
+                        solids.sphere(scale * c + offset, scale * r)
+                        for c, r in zip(rng.random((12, 3)), 0.05 + 0.15 * rng.random(12))
+                    ]
+                ),
+            )
+        ]
+    )
 
 
 def room_of_solids(rng):
     """A box within a ball, and balls within the box: seen from within, nothing leaves it."""
-    some = [solids.sphere((0, 0, 0), 4.0), solids.box((-2, -2, -2), (2, 2, 2)), *(solids.sphere(c, 0.3) for c in rng.uniform(-1.5, 1.5, (5, 3)))]
+    some = [
+        solids.sphere((0, 0, 0), 4.0),
+        solids.box((-2, -2, -2), (2, 2, 2)),
+        *(solids.sphere(c, 0.3) for c in rng.uniform(-1.5, 1.5, (5, 3))),
+    ]
     return Scene(solids=some)
 
 
@@ -221,7 +305,7 @@ def nested_boxes(rng=None):
 
 
 def lit(rng):
-    """Lights on the plane of a surface, on an edge and on a vertex of it, inside a closed mesh, and where the camera is."""
+    """Lights on the plane of a surface, on an edge and on a vertex of it, inside a closed mesh, and at the camera."""
     floor, body = sheet(rng), ball(rng, 6, 0.0)
     places = [(9.0, 3.5, 0.25), (2.5, 3.0, 0.25), (3.0, 3.0, 0.25), (3.0, 3.0, 1.5), (-2.0, 3.0, 4.0), (0.0, 0.0, 5.0)]
     lights = [Light(f"light {k}", "point", (10.0, 10.0, 10.0), p) for k, p in enumerate(places)]

@@ -11,7 +11,8 @@ NEAR = 1e-9
 
 
 def spawned(index, case, scene, n, seed, core):
-    """Rays that leave surfaces met from within a closed scene: 4 n from all that `case.inside` aims at, case.from_one from the first.
+    """Rays that leave surfaces met from within a closed scene: 4 n from all that `case.inside` aims at, case.from_one
+    from the first.
 
     Returns
     -------
@@ -24,11 +25,14 @@ def spawned(index, case, scene, n, seed, core):
     found = np.flatnonzero((hits.primitive >= 0) & (hits.normal != 0.0).any(axis=1))
     if not len(found):
         return inner.take(found)
-    return leave(hits, inner, np.concatenate([found[rng.integers(len(found), size=4 * n)], np.repeat(found[:1], case.from_one)]), rng, core)
+    return leave(hits, inner,
+                 np.concatenate([found[rng.integers(len(found), size=4 * n)], np.repeat(found[:1], case.from_one)]),
+                 rng, core)
 
 
 def leave(hits, batch, found, rng, core):
-    """Rays that leave the surfaces hit by some rays, to the side that they were met from, at all angles down to grazing ones."""
+    """Rays that leave the surfaces hit by some rays, to the side that they were met from, at all angles down to grazing
+    ones."""
     normal = hits.normal[found]
     normal = np.where(((normal * batch.d[found]).sum(axis=1) > 0.0)[:, None], -normal, normal)
     d = rng.normal(size=normal.shape)
@@ -43,7 +47,8 @@ def leave(hits, batch, found, rng, core):
         o = pushed(hits.point[found].T, hits.error[found], normal.T, d.T).T
     else:
         from ...pure.tracing.vectors import pushed
-        o = np.array([pushed(tuple(hits.point[k]), hits.error[k], tuple(n), tuple(x)) for k, n, x in zip(found, normal.tolist(), d.tolist())])
+        o = np.array([pushed(tuple(hits.point[k]), hits.error[k], tuple(n), tuple(x))
+                      for k, n, x in zip(found, normal.tolist(), d.tolist())])
     return Batch(o.reshape(-1, 3), d, leaving=np.stack([hits.object[found], hits.primitive[found]]).astype(np.int64))
 
 

@@ -18,19 +18,24 @@ from .truth import refusals, truth_row
 
 
 def contestants(names=None):
-    """Techniques with a core each; those for some kinds of ray hand over others. Embree and mathutils compute in float32 and are left out."""
-    return [(row.name, core) for row in techniques() if row.family != "peers" and (names is None or row.name in names) for core in row.cores]
+    """Techniques with a core each; those for some kinds of ray hand over others. Embree and mathutils compute in
+    float32 and are left out."""
+    return [(row.name, core) for row in techniques() if row.family != "peers" and (names is None or row.name in names)
+            for core in row.cores]
 
 
 def variants(name, core):
-    """Parameters of a technique that promise the same hits: every choice and switch besides the defaults, one at a time."""
+    """Parameters of a technique that promise the same hits: every choice and switch besides the defaults, one at a
+    time."""
     return [{p.name: value} for p in technique(name).parameters if p.choices or p.type is bool
-            for value in (p.choices_in(core) if p.choices else (False, True)) if value != p.default_in(core) and value not in p.inexact]
+            for value in (p.choices_in(core) if p.choices else (False, True))
+            if value != p.default_in(core) and value not in p.inexact]
 
 
 def takes(name, case):
     """Whether a technique serves the kinds of primitive in a case, and the case is one for it."""
-    return (not case.only or name in case.only) and (technique(name).primitives == "all" or not case.kinds - {technique(name).primitives})
+    kind = technique(name).primitives
+    return (not case.only or name in case.only) and (kind == "all" or not case.kinds - {kind})
 
 
 class Kept:
@@ -72,7 +77,8 @@ class Kept:
         return self.done[case.name]
 
 
-def run(full=False, seed=0, names=None, only=None, seconds=None, timed=True, say=lambda line: None, kept=None, resume=False):
+def run(full=False, seed=0, names=None, only=None, seconds=None, timed=True, say=lambda line: None, kept=None,
+        resume=False):
     """Run the suite.
 
     Parameters
@@ -97,7 +103,8 @@ def run(full=False, seed=0, names=None, only=None, seconds=None, timed=True, say
     -------
     dict
         rows : one a technique, core and case, with the keys COLUMNS. truth : one a case, with the keys TRUTH_COLUMNS.
-        pictures : one a technique, core and picture, with the keys of `examine_pictures`. single : see :func:`single_precision`.
+        pictures : one a technique, core and picture, with the keys of `examine_pictures`. single : see
+        :func:`single_precision`.
         left_out : list of str. failures : rows whose verdict is not ok. failed : bool. run : seed and full.
 
     Raises
@@ -113,7 +120,8 @@ def run(full=False, seed=0, names=None, only=None, seconds=None, timed=True, say
     began, rows, truths, drawn_rows, left_out, base, known, pace = time.monotonic(), [], [], [], [], {}, {}, {}
     kept = Kept(kept, {"seed": seed, "full": full, "names": names and sorted(names), "timed": timed}, resume)
     with_pictures = not only or any(c.name in only for c in drawn)
-    first = {"friendly", drawn[0].name if with_pictures else ""} if timed else set()            # what times are compared with
+    # what times are compared with
+    first = {"friendly", drawn[0].name if with_pictures else ""} if timed else set()
     chosen = [c for c in (*everything, *drawn) if not only or c.name in only or c.name in first]
 
     def done(case):
@@ -141,11 +149,14 @@ def run(full=False, seed=0, names=None, only=None, seconds=None, timed=True, say
                 continue
             for parameters in [{}, *(variants(name, core) if full and case.varied else ())]:
                 try:
-                    row = examine(case, scene, batch, right, name, core, seed, base.get((name, core)), timed and not parameters, parameters)
+                    row = examine(case, scene, batch, right, name, core, seed, base.get((name, core)),
+                                  timed and not parameters, parameters)
                 except RayscopeError:
                     raise
-                except Exception as error:                              # a technique that breaks is a finding, not our end
-                    row = {"case": case.name, "technique": name, "core": core, "rays": len(batch), "parameters": parameters,
+                # a technique that breaks is a finding, not our end
+                except Exception as error:
+                    row = {"case": case.name, "technique": name, "core": core, "rays": len(batch),
+                           "parameters": parameters,
                            "bad": list(range(len(batch))), "verdict": f"broke: {type(error).__name__}: {error}"}
                 record["rows"].append(row)
         return record
@@ -171,5 +182,6 @@ def run(full=False, seed=0, names=None, only=None, seconds=None, timed=True, say
     say("float32")
     single = single_precision([c for c in chosen if c in everything], seed) if names is None else []
     failures = [r for r in rows + truths + drawn_rows + single if not r["verdict"].startswith(("ok", "refused"))]
-    return {"rows": rows, "truth": truths, "pictures": drawn_rows, "single": single, "left_out": left_out, "failures": failures, "failed": bool(failures), "seconds": time.monotonic() - began,
+    return {"rows": rows, "truth": truths, "pictures": drawn_rows, "single": single, "left_out": left_out,
+            "failures": failures, "failed": bool(failures), "seconds": time.monotonic() - began,
             "run": {"seed": seed, "full": full}}

@@ -12,7 +12,8 @@ from .trial import EPSILON
 
 
 def between_mirrors(technique, depths=(1, 10, 100, 1000)):
-    """Two facing mirrors with a camera between them: how long a ray takes, and how wrong its sum is, by recursion depth.
+    """Two facing mirrors with a camera between them: how long a ray takes, and how wrong its sum is, by recursion
+    depth.
 
     Parameters
     ----------
@@ -26,13 +27,16 @@ def between_mirrors(technique, depths=(1, 10, 100, 1000)):
         seconds : of this thread, a ray. error : the largest of a pixel, in 2^-24, a picture's rounding.
     """
     scene, found = facing_mirrors(None), []
-    trace(scene, technique, size=(16, 16), depth=1)                     # what loads with the first picture is no part of it
+    # what loads with the first picture is no part of it
+    trace(scene, technique, size=(16, 16), depth=1)
     for depth in depths:
         start = time.thread_time()
         result = trace(scene, technique, size=(16, 16), depth=depth)
-        seconds, rays = time.thread_time() - start, sum(row["rays"] for row in result.figures.values() if isinstance(row, dict))
+        seconds, rays = time.thread_time() - start, sum(row["rays"] for row in result.figures.values()
+                                                        if isinstance(row, dict))
         right = 1.0 - MIRROR.mirror ** (depth + 1)
-        found.append((depth, seconds / rays, rays, float(np.abs(np.array(result.image[..., :3], float) - right).max()) * 2.0**24))
+        found.append((depth, seconds / rays, rays,
+                      float(np.abs(np.array(result.image[..., :3], float) - right).max()) * 2.0**24))
     return found
 
 
@@ -59,7 +63,8 @@ def drift(walk, cells=1000, rays=4, seed=0):
             exits.append((number, t_out))
 
     rng = np.random.default_rng(seed)
-    corners = np.array([[(0.0, 0.0, 0.0), (0.3, 0.7, 0.0), (0.0, 0.0, 0.7)], [(cells, 0.7, 0.7), (cells - 0.3, 0.0, 0.7), (cells, 0.7, 0.0)]])
+    corners = np.array([[(0.0, 0.0, 0.0), (0.3, 0.7, 0.0), (0.0, 0.0, 0.7)],
+                        [(cells, 0.7, 0.7), (cells - 0.3, 0.0, 0.7), (cells, 0.7, 0.0)]])
     scene = Scene.from_triangles(corners.reshape(-1, 3), [(0, 1, 2), (3, 4, 5)])
     index = build(scene, "grid", "pure", walk=walk, rule="heterogeneous", resolution=cells)
     worst = {}

@@ -8,9 +8,11 @@ from .plots import plots
 from .single import FAR32, T_BOUND32
 from .trial import variant_text
 
-COLUMNS = ("case", "technique", "core", "parameters", "rays", "wrong", "lost", "ghost", "leaks", "self_hits", "t_error", "t_ulp", "t_relative", "slow", "work", "verdict")
+COLUMNS = ("case", "technique", "core", "parameters", "rays", "wrong", "lost", "ghost", "leaks", "self_hits", "t_error",
+           "t_ulp", "t_relative", "slow", "work", "verdict")
 SINGLE_COLUMNS = ("case", "technique", "rays", "lost", "t_error", "t_error32", "warned", "verdict")
-TRUTH_COLUMNS = ("case", "rays", "lost", "ghost", "wrong", "leaks", "t_ulp", "t_relative", "t_error", "off_surface", "verdict")
+TRUTH_COLUMNS = ("case", "rays", "lost", "ghost", "wrong", "leaks", "t_ulp", "t_relative", "t_error", "off_surface",
+                 "verdict")
 
 
 def text(result):
@@ -25,11 +27,15 @@ def text(result):
                      "rays": sum(r["rays"] + r.get("spawned", 0) for r in some),
                      **{k: sum(r.get(k, 0) for r in some) for k in ("wrong", "lost", "ghost", "leaks", "self_hits")},
                      "t_error": max(r.get("t_error", 0.0) for r in some),
-                     "slowest": f"{slow['slow']:.1f} x with {slow['work']:.1f} x the work: {slow['case']}" if slow else "-"})
+                     "slowest": f"{slow['slow']:.1f} x with {slow['work']:.1f} x the work: {slow['case']}" if slow
+                     else "-"})
     lines = ["Techniques against brute force:", "",
-             report.table(sums, ("technique", "core", "cases", "runs", "rays", "wrong", "lost", "ghost", "leaks", "self_hits", "t_error", "slowest")), "",
+             report.table(sums,
+                          ("technique", "core", "cases", "runs", "rays", "wrong", "lost", "ghost", "leaks", "self_hits",
+                           "t_error", "slowest")), "",
              "Brute force against exact arithmetic:", "", report.table(result["truth"], TRUTH_COLUMNS), "",
-             "Pictures, those that took longest by their work or failed:", "", report.table(_worst(result["pictures"]), examine_pictures.COLUMNS), "",
+             "Pictures, those that took longest by their work or failed:", "",
+             report.table(_worst(result["pictures"]), examine_pictures.COLUMNS), "",
              "Float32, against ours:", "", report.table(result["single"], SINGLE_COLUMNS), "",
              "runs: of cases, with the defaults and every choice of the parameters. rays: with those that leave surfaces.",
              "t_error: of t, in 2^-52 max(|t|, size of the scene); 8 are allowed between techniques.",
@@ -60,7 +66,10 @@ def write(result, folder, say=lambda line: None):
         How to get plots, where matplotlib is missing; else empty.
     """
     folder, files = report.folder(folder), []
-    for name, content in (("table.txt", text(result) + "\n"), ("table.csv", report.to_csv([row | {"parameters": variant_text("", row["parameters"])[2:]} for row in result["rows"]], COLUMNS)),
+    for name, content in (("table.txt", text(result) + "\n"),
+                          ("table.csv",
+                           report.to_csv([row | {"parameters": variant_text("", row["parameters"])[2:]}
+                                          for row in result["rows"]], COLUMNS)),
                           ("exact.csv", report.to_csv(result["truth"], TRUTH_COLUMNS)),
                           ("float32.csv", report.to_csv(result["single"], SINGLE_COLUMNS)),
                           ("pictures.csv", report.to_csv(result["pictures"], examine_pictures.COLUMNS))):

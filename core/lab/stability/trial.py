@@ -54,7 +54,8 @@ def asked(batch, index, **more):
     """A structure's hits, as arrays."""
     with np.errstate(over="ignore", invalid="ignore"):
         hits = batch.ask(index, **more)
-    for name in ("t", "primitive", "object", "normal", "point", "error", *(("n_it", "n_ts") if more.get("count") else ())):
+    for name in ("t", "primitive", "object", "normal", "point", "error",
+                 *(("n_it", "n_ts") if more.get("count") else ())):
         setattr(hits, name, np.asarray(getattr(hits, name)))
     return hits
 

@@ -24,7 +24,8 @@ def truth(case, scene, batch, hits):
     Returns
     -------
     dict
-        rays : those checked. lost, ghost : hits that are sure and were not found, or were found and are none; a ray that
+        rays : those checked. lost, ghost : hits that are sure and were not found, or were found and are none; a ray
+        that
         passes an edge by less than EDGE of the coordinates may do either. wrong : nearer hits overlooked. t_ulp,
         t_relative : largest error of t in units of its last place and as part of it. t_error : the largest, in units
         of EPSILON * max(|t|, size of the scene). off_surface : largest distance of the ray's point at t from the
@@ -32,7 +33,8 @@ def truth(case, scene, batch, hits):
     """
     balls = [s for o in scene.objects if not isinstance(o.geometry, Mesh) for s in o.geometry.solids]     # and boxes
     corners = corners_of(scene)
-    numbers = [(i, k) for i, o in enumerate(scene.objects) if isinstance(o.geometry, Mesh) for k in np.flatnonzero(o.geometry.usable)]
+    numbers = [(i, k) for i, o in enumerate(scene.objects) if isinstance(o.geometry, Mesh)
+               for k in np.flatnonzero(o.geometry.usable)]
     row = dict(rays=0, lost=0, ghost=0, wrong=0, t_ulp=0.0, t_relative=0.0, t_error=0.0, off_surface=0.0, bad=[])
     size, place = size_of(scene), {key: k for k, key in enumerate(numbers)}
     lists = corners.tolist()
@@ -41,7 +43,8 @@ def truth(case, scene, batch, hits):
         if not (np.isfinite(o).all() and np.isfinite(d).all() and any(d)):
             continue
         row["rays"] += 1
-        coordinates = max(max(map(abs, o)), float(np.abs(corners).max(initial=0.0)), *(float(np.abs(s.matrix).max()) for s in balls), 0.0)
+        coordinates = max(max(map(abs, o)), float(np.abs(corners).max(initial=0.0)),
+                          *(float(np.abs(s.matrix).max()) for s in balls), 0.0)
         slack = EDGE * coordinates
         if balls:
             right = _nearest_solid(o, d, balls)
@@ -72,7 +75,10 @@ def truth(case, scene, batch, hits):
                 failed = True
             elif right is None:
                 pass                                                    # beside the edge, by less than rounding
-            elif number not in right[1] and float(exact.Fraction(t) - right[0]) * length > slack and _sure(o, d, right, lists, balls, slack, within):
+            elif number not in right[1] and float(exact.Fraction(t) - right[0]) * length > slack and _sure(o, d, right,
+                                                                                                           lists, balls,
+                                                                                                           slack,
+                                                                                                           within):
                 row["wrong"] += 1
                 failed = True
             if own is not None and off <= slack:
@@ -117,7 +123,8 @@ def _nearest_solid(o, d, balls):
 
 
 def _sure(o, d, right, lists, balls, slack, within=(-math.inf, math.inf)):
-    """Whether an exact hit lies further than `slack` from the primitive's outline, for one primitive of those tied at least.
+    """Whether an exact hit lies further than `slack` from the primitive's outline, for one primitive of those tied at
+    least.
 
     And from the ends of the ray, `within`: which side of a surface a ray begins on that begins on it, nobody can say.
     """
@@ -136,7 +143,8 @@ def _sure(o, d, right, lists, balls, slack, within=(-math.inf, math.inf)):
         a, b, c = (np.array(p) for p in lists[k])
         n = np.cross(b - a, c - a)
         slope = abs(float(n @ np.array(d))) / (np.linalg.norm(n) * np.linalg.norm(d) or 1.0)
-        clear = min(np.linalg.norm(np.cross(y - x, at - x)) / (np.linalg.norm(y - x) or 1.0) for x, y in ((a, b), (b, c), (c, a)))
+        clear = min(np.linalg.norm(np.cross(y - x, at - x)) / (np.linalg.norm(y - x) or 1.0)
+                    for x, y in ((a, b), (b, c), (c, a)))
         if clear * slope > slack and slope > 1e-12:
             return True
     return False
