@@ -12,7 +12,8 @@ ENGINE = "RAYSCOPE"
 #: Depth where nothing is seen, as in Cycles.
 FAR_AWAY = 1e10
 
-#: Cycles' names of its standard passes, and whether the view layer wants them: (name, channels, type, property, array of the trace).
+#: Cycles' names of its standard passes, and whether the view layer wants them:
+#: (name, channels, type, property, array of the trace).
 BUILT_IN = (
     ("Depth", "Z", "VALUE", "use_pass_z", "depth"),
     ("Position", "XYZ", "VECTOR", "use_pass_position", "position"),
@@ -20,8 +21,13 @@ BUILT_IN = (
     ("IndexOB" if bpy.app.version < (5, 0) else "Object Index", "X", "VALUE", "use_pass_object_index", "pass_index"),
 )
 #: Our own: (name, setting that asks for it, array of the trace).
-OWN = (("Rayscope Object", "index_passes", "object_index"), ("Rayscope Primitive", "index_passes", "primitive_index"),
-       ("N_IT", "count", "n_it"), ("N_TS", "count", "n_ts"), ("Rays per Pixel", "count", "rays_per_pixel"))
+OWN = (
+    ("Rayscope Object", "index_passes", "object_index"),
+    ("Rayscope Primitive", "index_passes", "primitive_index"),
+    ("N_IT", "count", "n_it"),
+    ("N_TS", "count", "n_ts"),
+    ("Rays per Pixel", "count", "rays_per_pixel"),
+)
 
 
 def passes_of(scene, view_layer):
@@ -62,6 +68,7 @@ class RayscopeRenderEngine(bpy.types.RenderEngine):
         """Render a view layer; the tiles done are added to `written`."""
         import numpy as np
         from . import tasks
+
         scene, layer = depsgraph.scene, depsgraph.view_layer
         passes = list(passes_of(scene, layer))
         self.update_stats("", "Reading the scene")
@@ -69,7 +76,9 @@ class RayscopeRenderEngine(bpy.types.RenderEngine):
         task = tasks.Trace(depsgraph, self.camera_override, region)
         for notice in task.scene.notices:
             print(f"Rayscope: {notice}")
-        pass_index = np.array([_pass_index(depsgraph, o.name) for o in task.scene.objects] + [0], np.float32)  # -1, nothing, takes the last
+        pass_index = np.array(
+            [_pass_index(depsgraph, o.name) for o in task.scene.objects] + [0], np.float32
+        )  # -1, nothing, takes the last
         left, bottom = region[:2] if region else (0, 0)
 
         def flat(array):
@@ -112,19 +121,26 @@ class RayscopeRenderEngine(bpy.types.RenderEngine):
         """What this viewport shows."""
         if self._preview is None:
             from .show import preview
+
             self._preview = preview.Preview()
             weakref.finalize(self, self._preview.stop)  # in __del__, Blender has already taken the attributes away
         return self._preview
 
 
 def border_of(scene):
-    """The part of the picture that is rendered, in pixels: x0, y0, x1, y1; None for all of it. Truncated as Blender does."""
+    """The part of the picture that is rendered, in pixels, truncated as Blender does: x0, y0, x1, y1; None for all."""
     render = scene.render
     if not render.use_border:
         return None
     from .tasks import picture_size
+
     width, height = picture_size(scene)
-    return (int(render.border_min_x * width), int(render.border_min_y * height), int(render.border_max_x * width), int(render.border_max_y * height))
+    return (
+        int(render.border_min_x * width),
+        int(render.border_min_y * height),
+        int(render.border_max_x * width),
+        int(render.border_max_y * height),
+    )
 
 
 def _pass_index(depsgraph, name):
@@ -134,13 +150,24 @@ def _pass_index(depsgraph, name):
 
 
 #: Panels of other engines that show what we use, by class name; those with BLENDER_RENDER in their list come besides.
-MORE_PANELS = {"EEVEE_MATERIAL_PT_context_material", "EEVEE_MATERIAL_PT_surface", "MATERIAL_PT_preview", "DATA_PT_EEVEE_light", "EEVEE_WORLD_PT_surface"}
-#: DATA_PT_light would be a second Light panel. Its set of engines is shared by its copy in the node editor, hence the look at identities below.
+MORE_PANELS = {
+    "EEVEE_MATERIAL_PT_context_material",
+    "EEVEE_MATERIAL_PT_surface",
+    "MATERIAL_PT_preview",
+    "DATA_PT_EEVEE_light",
+    "EEVEE_WORLD_PT_surface",
+}
+#: DATA_PT_light would be a second Light panel. Its set of engines is shared by its copy in the node editor, hence the
+#: look at identities below.
 NOT_OURS = {"DATA_PT_light"}
 
 
 def _panels():
-    panels = {panel.__name__: panel.COMPAT_ENGINES for panel in bpy.types.Panel.__subclasses__() if getattr(panel, "COMPAT_ENGINES", None)}
+    panels = {
+        panel.__name__: panel.COMPAT_ENGINES
+        for panel in bpy.types.Panel.__subclasses__()
+        if getattr(panel, "COMPAT_ENGINES", None)
+    }
     not_ours = {id(panels.get(name)) for name in NOT_OURS}
     for name, engines in panels.items():
         if id(engines) not in not_ours and ("BLENDER_RENDER" in engines or name in MORE_PANELS):

@@ -23,7 +23,9 @@ def kinds_of(scene):
     if not settings.row().ray_by_ray:
         return {}
     kinds = {kind: getattr(settings, kind) for kind in ("primary", "secondary", "shadow")}
-    kinds = {kind: STANDARD if name == "chosen" and kind not in settings.row().rays else name for kind, name in kinds.items()}
+    kinds = {
+        kind: STANDARD if name == "chosen" and kind not in settings.row().rays else name for kind, name in kinds.items()
+    }
     return {kind: name for kind, name in kinds.items() if name != "chosen"}
 
 
@@ -31,13 +33,24 @@ def options_of(scene):
     """A Blender scene's other settings, as keywords of :class:`~rayscope.core.rendering.Rendering`."""
     settings = scene.rayscope
     fewer = {name: getattr(settings.fewer_rays, name) for name in settings.fewer_rays.__annotations__}
-    return {"depth": settings.depth, "samples": settings.samples, "seed": settings.seed, "count": settings.count, **fewer}
+    return {
+        "depth": settings.depth,
+        "samples": settings.samples,
+        "seed": settings.seed,
+        "count": settings.count,
+        **fewer,
+    }
 
 
 def picture_size(scene):
     """Width and height of a Blender scene's renders."""
     render = scene.render
-    return check_size((render.resolution_x * render.resolution_percentage // 100, render.resolution_y * render.resolution_percentage // 100))
+    return check_size(
+        (
+            render.resolution_x * render.resolution_percentage // 100,
+            render.resolution_y * render.resolution_percentage // 100,
+        )
+    )
 
 
 class Build:
@@ -54,15 +67,24 @@ class Build:
         self.uid, self.n_objects = context.scene.session_uid, len(context.scene.objects)
         self.scene = read_scene(context.evaluated_depsgraph_get(), for_render=False)
         if not self.scene.n_primitives:
-            raise SceneError(f"{context.scene.name}: it shows no mesh with faces, so there is nothing to build over. Add a mesh, or unhide one.")
+            raise SceneError(
+                f"{context.scene.name}: it shows no mesh with faces, so there is nothing to build over. "
+                "Add a mesh, or unhide one."
+            )
         self.choice = choice_of(context.scene)
         self.estimate = estimate(self.scene, self.choice["technique"], self.choice["core"]).check_memory()
 
     def __call__(self, progress):
         from . import inspection
         from ..core import build
-        index = build(self.scene, self.choice["technique"], self.choice["core"], progress=lambda fraction: progress(0.95 * fraction),
-                      **self.choice["parameters"])
+
+        index = build(
+            self.scene,
+            self.choice["technique"],
+            self.choice["core"],
+            progress=lambda fraction: progress(0.95 * fraction),
+            **self.choice["parameters"],
+        )
         inspection.warn(self.uid, self.scene)
         return session.Built(self.scene, index, index.cells(), self.choice["technique"], self.n_objects)
 
@@ -100,13 +122,18 @@ class Trace:
             raise SceneError("\n".join(str(notice) for notice in self.scene.notices if "camera" in notice.text))
         self.choice, self.options = choice_of(scene) | kinds_of(scene), options_of(scene)
         self.result, self.changed = None, False
-        self.estimate = estimate(self.scene, self.choice["technique"], self.choice["core"], self.size, **self.options).check_memory()
+        self.estimate = estimate(
+            self.scene, self.choice["technique"], self.choice["core"], self.size, **self.options
+        ).check_memory()
 
     def __call__(self, progress, on_tile=None):
         from . import inspection
         from ..core.rendering import Rendering
+
         inspection.warn(self.uid, self.scene)
-        rendering = Rendering(self.scene, size=self.size, region=self.region, progress=progress, **self.choice, **self.options)
+        rendering = Rendering(
+            self.scene, size=self.size, region=self.region, progress=progress, **self.choice, **self.options
+        )
         self.result = rendering.result
         for tile in rendering.tiles():
             self.changed = True

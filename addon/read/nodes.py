@@ -5,7 +5,7 @@ import numpy as np
 
 from ...core.scene.material import Image
 from .images import read_image
-from .values import LUMINANCE, Value, grey, multiply, pixelwise
+from .values import Value, grey, multiply, pixelwise
 
 #: More steps than this from socket to socket can only be a circle.
 MAX_STEPS = 1000

@@ -1,4 +1,4 @@
-"""What an inspection found, for artists: cost by object, causes with remedies, warnings about numbers; each can be selected."""
+"""What an inspection found, for artists: cost by object, causes with remedies, warnings; each can be selected."""
 
 import textwrap
 
@@ -10,8 +10,14 @@ from .. import inspection
 
 #: Rows and findings shown, at most.
 SHOWN = 12
-ICONS = {"far from the origin": "ORIENTATION_GLOBAL", "range of scale": "FULLSCREEN_ENTER", "zero scale": "EMPTY_AXIS", "slivers": "MESH_DATA", "no area": "MESH_DATA",
-         "coincident surfaces": "MOD_SOLIDIFY"}
+ICONS = {
+    "far from the origin": "ORIENTATION_GLOBAL",
+    "range of scale": "FULLSCREEN_ENTER",
+    "zero scale": "EMPTY_AXIS",
+    "slivers": "MESH_DATA",
+    "no area": "MESH_DATA",
+    "coincident surfaces": "MOD_SOLIDIFY",
+}
 
 
 class RAYSCOPE_OT_inspect(Work, bpy.types.Operator):
@@ -32,7 +38,9 @@ class RAYSCOPE_OT_inspect(Work, bpy.types.Operator):
             return "The inspection was stopped: the findings shown are the previous ones"
         task.keep(job.result)
         result, warned = job.result
-        found = ", ".join(f"{n} {word}{'s' * (n != 1)}" for n, word in ((len(result.findings), "finding"), (len(warned), "warning")))
+        found = ", ".join(
+            f"{n} {word}{'s' * (n != 1)}" for n, word in ((len(result.findings), "finding"), (len(warned), "warning"))
+        )
         return f"{found} after {result.rays:,} rays"
 
 
@@ -75,7 +83,10 @@ def draw_finding(layout, finding, width):
     """One finding: whom, what, remedy."""
     box = layout.box().column(align=True)
     row = box.row()
-    row.label(text=", ".join(finding.objects[:3]) + (" ..." if len(finding.objects) > 3 else ""), icon=ICONS.get(finding.cause, "INFO"))
+    row.label(
+        text=", ".join(finding.objects[:3]) + (" ..." if len(finding.objects) > 3 else ""),
+        icon=ICONS.get(finding.cause, "INFO"),
+    )
     draw_select(row, finding.objects, "Select")
     gain = f" Saves {finding.gain:.0%} of the work (tried)." if finding.gain is not None else ""
     for text in (f"{finding.cause.capitalize()}: {finding.text}.{gain}", finding.remedy):
@@ -129,7 +140,9 @@ class RAYSCOPE_PT_warnings(Sidebar, bpy.types.Panel):
             draw_finding(self.layout, finding, width)
 
 
-_register, _unregister = bpy.utils.register_classes_factory((RAYSCOPE_OT_inspect, RAYSCOPE_OT_select, RAYSCOPE_PT_findings, RAYSCOPE_PT_warnings))
+_register, _unregister = bpy.utils.register_classes_factory(
+    (RAYSCOPE_OT_inspect, RAYSCOPE_OT_select, RAYSCOPE_PT_findings, RAYSCOPE_PT_warnings)
+)
 
 
 def register():

@@ -276,7 +276,6 @@ class Polygons:
         n, anchor = self.corners.normal[:, item].T, self.corners.anchor[:, item].T
         low, high = np.full(lo.shape, np.inf), np.full(lo.shape, -np.inf)
         kz = np.abs(n).argmax(axis=1)
-        i = np.arange(len(item))
         for axis in range(3):
             b, c = (axis + 1) % 3, (axis + 2) % 3
             for at_b in (lo[:, b], hi[:, b]):

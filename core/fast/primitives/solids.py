@@ -226,7 +226,7 @@ class UnitShapes:
             if not len(open_):
                 break
             i = item[open_]
-            m, w, origin = self.matrix[:, :, i], self.inverse[:, :, i], self.origin[:, i]
+            w, origin = self.inverse[:, :, i], self.origin[:, i]
             c, h = centre[:, open_], half[:, open_]
             # In unit space the box is centred at b, with the half-edges w[:, k] * h[k].
             b = c - origin

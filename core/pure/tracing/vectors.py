@@ -2,7 +2,7 @@
 
 import math
 
-from ...vectors import add, cross, dot, minus, mul, times, unit  # noqa: F401: all that tracers need of vectors
+from ...vectors import add, cross, dot, minus, mul, times, unit  # noqa: F401 -- all that tracers need of vectors
 
 
 #: Moves nothing but zeros.
