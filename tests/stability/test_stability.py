@@ -112,6 +112,8 @@ def test_a_wrong_picture_is_seen(spoil, verdict, monkeypatch):
 
 def test_cases_are_what_they_say():
     assert len(CASES) == len(cases()) > 25 and len(cases(full=True)) > 80
+    # --cases takes names with commas between them
+    assert not [c.name for c in (*cases(full=True), *pictures(full=True)) if "," in c.name]
     scene, batch = scene_and_rays(CASES["concave closed mesh"], 0, RAYS)
     rays = spawned.spawned(build(scene, "bvh"), CASES["concave closed mesh"], scene, RAYS, 0, "fast")
     assert len(rays) == 4 * RAYS + 100 and (rays.leaving >= 0).all() and len(np.unique(rays.o[-100:], axis=0)) <= 100

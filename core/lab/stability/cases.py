@@ -120,7 +120,7 @@ def cases(full=False):
         Case("closed mesh", moved_ball(rows=16 if full else 8), aimed_inside, inside=from_the_middle),
         Case("closed mesh far away", moved_ball(offset=FAR, rows=16 if full else 8), aimed_inside,
              inside=from_the_middle),
-        *(Case(f"closed mesh{where}, {n:,} rays", moved_ball(offset=offset, rows=16), aimed_inside, n=n, cores=(core,),
+        *(Case(f"closed mesh{where} by {n} rays", moved_ball(offset=offset, rows=16), aimed_inside, n=n, cores=(core,),
                varied=False)
           for where, offset in (("", (0, 0, 0)), (" far away", FAR))
           for core, n in (("pure", 1500), ("fast", 100_000)) if full),
