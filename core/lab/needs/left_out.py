@@ -187,7 +187,7 @@ def _others(scene, seen, tests, rays, rows, core, size, samples, depth):
         elif row.name in CALIBRATED[core]:
             why = "calibrating, which takes no more than a second, did not come to it yet"
         else:
-            why = "it was the quickest for no scene that was measured, so it is no candidate and is fitted roughly"
+            why = "it was hardly ever the quickest where pictures were measured: no candidate, and fitted roughly"
         seconds = sum(model.per_ray(kind, seen.measures, tests)[2] * rays[kind] for kind in served)
         yield (
             row.name,
