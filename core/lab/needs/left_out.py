@@ -221,7 +221,8 @@ def _import(core, family, *modules):
     for file in files:
         SourceFileLoader(file.stem, str(file)).get_code(file.stem)
     seconds, size = time.perf_counter() - start, sum(f.stat().st_size for f in files)
-    return f"{_about(seconds)} at least to import {len(files)} module(s), {_bytes(size)}"
+    number = "one module" if len(files) == 1 else f"{len(files)} modules"
+    return f"{_about(seconds)} at least to import {number}, {_bytes(size)}"
 
 
 def _change_seconds(core):

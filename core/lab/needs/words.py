@@ -43,7 +43,7 @@ def text(result):
             + "; ".join(f"{kind} rays: {', '.join(names)}" for kind, names in result.tried.items() if names)
         )
     lines += [
-        f"  {len(set(result.choice.values()))} structure(s), {2 if 'instance' in seen.kinds else 1} level(s); "
+        f"  Structures: {len(set(result.choice.values()))}; levels: {2 if 'instance' in seen.kinds else 1}; "
         f"{result.precision}.",
         "",
         "Left out:",
