@@ -2,7 +2,6 @@
 
 import os
 import sys
-import tempfile
 from pathlib import Path
 
 #: Where the user's cache is, if not where the system has it: Blender has a folder for each extension.
@@ -32,6 +31,7 @@ def folder():
 
 def write(path, text):
     """Write a file as a whole, so that nobody reads half of it; where that is not possible, nothing is raised."""
+    import tempfile                                     # not at Blender's start, which imports this module
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         handle, name = tempfile.mkstemp(dir=path.parent)

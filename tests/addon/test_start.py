@@ -35,6 +35,6 @@ def test_enabling_is_quick_and_loads_only_tables(tmp_path):
         out = subprocess.run(command, env=environment, text=True, capture_output=True, timeout=120).stdout
         said = {line.split()[0]: line.split()[1:] for line in out.splitlines() if line.split()}
         assert said["NUMPY"] == ["False"]
-        assert said["CORE"] == ["catalogue", "errors", "figures", "options", "parameters"]
+        assert said["CORE"] == ["catalogue", "errors", "figures", "options", "parameters", "user_files"]
         seconds.append(float(said["SECONDS"][0]))
     assert min(seconds) < 0.15, seconds
