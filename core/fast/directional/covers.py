@@ -27,8 +27,8 @@ class Covers:
         self.edges, self.low = edges, low
 
     @classmethod
-    def of(cls, view, primitives, item):
-        """Outlines of some primitives, in a view."""
+    def of(cls, view, primitives, item, searched=True):
+        """Outlines of some primitives, in a view; of Boolean combinations, where a box within has to be searched for, only if `searched`."""
         n = len(item)
         which = np.searchsorted(primitives.starts, item, side="right") - 1
         sides = 3 if all(k.KIND == "triangle" for k in primitives.kinds) else SIDES
@@ -41,7 +41,7 @@ class Covers:
                 own = item[at] - primitives.starts[k]
                 if kind.KIND == "triangle":
                     found = _of_triangles(view, kind.hull(own))
-                elif hasattr(kind, "inscribed_box"):
+                elif hasattr(kind, "inscribed_box") and (searched or kind.KIND != "csg"):
                     found = _of_boxes(view, kind.inscribed_box(own))
                 else:
                     continue

@@ -296,7 +296,8 @@ class Lists:
     def inner_rows(self):
         """For each footprint 3 k numbers, float32, k planes a u + b v + c over the window: nearness is surely more than the first, and the
         primitive surely there where all others are positive. They are less by what single precision loses."""
-        covers = Covers.of(self.view, self.primitives, self.feet.item)
+        # A search takes longer than the tests that it would save.
+        covers = Covers.of(self.view, self.primitives, self.feet.item, searched=False)
         with np.errstate(all="ignore"):
             planes = np.concatenate([covers.low[:, None], covers.edges / np.abs(covers.edges).max(axis=0)], axis=1)
             planes[2] -= 2.0 * LOSS * np.abs(planes).sum(axis=0)

@@ -108,6 +108,8 @@ class Trees:
         self._box(boxes)
         #: Small boxes that hold each combination.
         self.cover = [self._cover(k) for k in range(self.n)]
+        #: Boxes within them, of those that were asked for: they are searched once.
+        self._within = {}
         self.lo, self.hi = (np.array([f(c[end], axis=0) for c in self.cover]).reshape(-1, 3) for end, f in ((0, np.min), (1, np.max)))
         for box, lo, hi in zip(boxes, self.lo.tolist(), self.hi.tolist()):
             box[-1] = tuple(lo), tuple(hi)
@@ -359,8 +361,10 @@ class Trees:
 
     def inscribed_box(self, item):
         """Corners, shape (m, 8, 3), of boxes within the combinations; NaN where none was found."""
-        found = {k: self._inscribed(k) for k in np.unique(item)}
-        lo, hi = (np.array([found[k][end] for k in item]).reshape(-1, 3) for end in (0, 1))
+        for k in np.unique(item):
+            if k not in self._within:
+                self._within[k] = self._inscribed(k)
+        lo, hi = (np.array([self._within[k][end] for k in item]).reshape(-1, 3) for end in (0, 1))
         return np.stack([np.where([k & 1, k >> 1 & 1, k >> 2], hi, lo) for k in range(8)], axis=1)
 
     def _inscribed(self, k):
