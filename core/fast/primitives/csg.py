@@ -382,13 +382,17 @@ class Trees:
         box = np.stack([lo[largest], hi[largest]])
         for axis in range(3):
             for side, limit in ((0, self.lo[k, axis]), (1, self.hi[k, axis])):
-                step = limit - box[side, axis]
+                # All places that steps of a half, a quarter ... may lead to, looked at together.
+                step, places = limit - box[side, axis], box[None, side, axis]
                 for _ in range(STEPS):
                     step *= 0.5
-                    grown = box.copy()
-                    grown[side, axis] += step
-                    if self._holds(k, root, grown[:1], grown[1:])[0]:
-                        box = grown
+                    places = np.stack([places, places + step], axis=1).ravel()
+                grown = np.repeat(box[None], len(places), axis=0)
+                grown[:, side, axis] = places
+                inside, taken = self._holds(k, root, grown[:, 0], grown[:, 1]), 0
+                for bit in range(STEPS - 1, -1, -1):
+                    taken += inside[taken + 2**bit] * 2**bit
+                box = grown[taken]
         return box
 
 
