@@ -7,8 +7,8 @@ import numpy as np
 from .fast.rays import left, part
 from .hits import Hits
 
-#: Part of what rays will still take, about, that a trial and what is built for it may cost: whatever comes of it,
-#: little is lost.
+#: Part of what rays will still take, about, that a trial, what is built for it, and all that earlier trials lost may come
+#: to: whatever comes of it, little is lost.
 SHARE = 0.04
 #: Rays have taken so long before the first trial: then it is known what one takes. Seconds.
 START = 0.02
@@ -50,7 +50,7 @@ class Contest:
 
     def __init__(self, structure, others, expected):
         self.structures, self.others, self.expected = [structure], list(others), expected
-        self.seen, self.seconds, self._due = 0, 0.0, START
+        self.seen, self.seconds, self.spent, self._due = 0, 0.0, 0.0, START
         self._small, self._large = (np.inf, 0.0), (0, 0.0)  # batches: rays, seconds
         self.batch, self.ray = [0.0], [0.0]
         self._own = {}
@@ -152,6 +152,8 @@ class Contest:
         parts, answers, done = [], [], 0
         if self.seconds >= self._due and self.seen:
             parts, answers, done = self._trial(n, ask, light)
+            # what the leader would have taken is not lost
+            self.spent += max(time.thread_time() - start - done * self.seconds / self.seen, 0.0)
         answers.append(ask(self.asked(self._quickest(n), light), slice(done, n) if done else slice(None)))
         took = time.thread_time() - start
         self.seen, self.seconds = self.seen + n, self.seconds + took
@@ -168,7 +170,7 @@ class Contest:
     def _entered(self, n):
         """Who takes part in a trial among n rays: what is to be built for it, and how many rays each gets at last."""
         ray = self.seconds / self.seen
-        left = SHARE * ray * max(self.expected - self.seen, LASTING * self.seen)
+        left = SHARE * ray * max(self.expected - self.seen, LASTING * self.seen) - self.spent
         # Few rays may take as long as many.
         own = SLOWER * LEAST * ray + ASKED * self._batch()
         left -= own * (len(self.structures) - 1)
