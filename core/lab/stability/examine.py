@@ -91,7 +91,7 @@ def examine(case, scene, batch, right, name, core, seed, base=None, timed=True, 
         row["bad_spawned"] = [{"o": rays.o[k].tolist(), "d": rays.d[k].tolist(), "leaving": rays.leaving[:, k].tolist()}
                               for k in np.flatnonzero(met | through)[:5]]
     row["bad"] = np.flatnonzero(bad).tolist()
-    if timed and len(batch):
+    if timed and case.timed and len(batch):
         row |= _timed(index, batch, core, base)
     failed = [f"{row[k]} {k.replace('_', '-')}" for k in ("wrong", "lost", "ghost", "leaks", "self_hits") if row[k]]
     if row.get("slow") and row["slow"] > SLOW * max(1.0, row["work"]) and row["seconds"] > NOISE:
