@@ -94,15 +94,8 @@ class Contest:
         """As of a structure."""
 
         def ask(structure, which):
-            return structure.closest(
-                origins[which],
-                directions[which],
-                part(t_min, which),
-                part(t_max, which),
-                count,
-                progress,
-                left(structure, leaving, which),
-            )
+            given = _some(structure, which, origins, directions, t_min, t_max, count, progress, leaving)
+            return structure.closest(*given)
 
         answers, order = self._put(len(origins), ask, light)
         if order is None:
@@ -124,16 +117,8 @@ class Contest:
         """As of a structure."""
 
         def ask(structure, which):
-            answer = structure.occluded(
-                origins[which],
-                directions[which],
-                part(t_min, which),
-                part(t_max, which),
-                count,
-                progress,
-                left(structure, leaving, which),
-                through,
-            )
+            given = _some(structure, which, origins, directions, t_min, t_max, count, progress, leaving)
+            answer = structure.occluded(*given, through)
             return answer if count else (answer, {})
 
         answers, order = self._put(len(origins), ask, light)
@@ -223,6 +208,12 @@ class Contest:
         """The number of the structure that is the quickest with n rays."""
         seconds = [batch + ray * n for batch, ray in zip(self.batch, self.ray)]
         return seconds.index(min(seconds))
+
+
+def _some(structure, which, origins, directions, t_min, t_max, count, progress, leaving):
+    """What a structure is asked about some of the rays."""
+    ends = part(t_min, which), part(t_max, which)
+    return origins[which], directions[which], *ends, count, progress, left(structure, leaving, which)
 
 
 class OneLight:

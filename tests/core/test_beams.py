@@ -12,7 +12,7 @@ from rayscope.core import Camera, Light, Material, Mesh, Object, Scene, World, b
 from rayscope.core.errors import Cancelled, MemoryEstimateError
 from rayscope.core.fast.generalised import beam_clip as fast_clip
 from rayscope.core.lab.picture_error import errors
-from rayscope.core.lab.rooms import box, polygonal_room
+from rayscope.core.lab.rooms import polygonal_room
 from rayscope.core.pure.generalised import beam_clip as pure_clip
 from rayscope.core.scene.faces import CORNERS, Faces, convex_pieces
 

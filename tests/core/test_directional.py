@@ -153,7 +153,6 @@ def test_deep_scenes_hide_what_is_behind(size, monkeypatch):
     from rayscope.core.fast.directional import image_directory
     monkeypatch.setattr(image_directory, "PAIRS", 3000)
     monkeypatch.setattr(image_directory, "TILE", 4)
-    rng = np.random.default_rng(0)
     x, y = np.meshgrid(np.arange(12.0), np.arange(12.0), indexing="ij")
     corner = np.stack([x.ravel(), y.ravel()], axis=1)
     layers = []

@@ -1,10 +1,7 @@
 """The benchmark of generalised rays, on pictures so small that its times mean nothing."""
 
-import math
-
 import pytest
 
-from rayscope.core import solids, trace
 from rayscope.core.lab import generalised
 from rayscope.core.lab.rooms import ball_on_floor, lamp
 

@@ -13,12 +13,12 @@ from rayscope.core.command import main
 from rayscope.core.fast.query import Closest
 from rayscope.core.lab import stability
 from rayscope.core.lab.stability import examine as examining
-from rayscope.core.lab.stability import examine_pictures, failures, plots, single, spawned, suite, sweeps
+from rayscope.core.lab.stability import examine_pictures, plots, single, spawned, suite, sweeps
 from rayscope.core.lab.stability import truth as truths
 from rayscope.core.lab.stability.cases import cases
 from rayscope.core.lab.stability.examine import examine
 from rayscope.core.lab.stability.pictures import pictures
-from rayscope.core.lab.stability.rays import Batch, corners_of
+from rayscope.core.lab.stability.rays import corners_of
 from rayscope.core.lab.stability.trial import asked, built, scene_and_rays
 from rayscope.core.lab.stability.truth import truth
 

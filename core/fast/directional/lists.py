@@ -12,7 +12,7 @@ import numpy as np
 from ..query import Occluded
 from .covers import Covers
 from .image_directory import inside
-from .quadtree import Quadtree, cut, nearness as nearness_in
+from .quadtree import Quadtree, nearness as nearness_in
 from .raster import Grid, spans
 from .view import Footprints
 

@@ -15,7 +15,7 @@ from ...hits import Hits
 from ...scene.footprints import RAYS
 from ..rays import Rays
 from ..tracing import sampling
-from ..tracing.whitted import COUNTED, PRIMARY, REFLECTED, REFRACTED, TRANSPARENT, Wave, Whitted
+from ..tracing.whitted import COUNTED, PRIMARY, Wave, Whitted
 from .cone import Cones
 from .footprints import FootprintTree
 from .outlines import scattered

@@ -4,8 +4,6 @@ import json
 import time
 from pathlib import Path
 
-import numpy as np
-
 from ...catalogue import technique, techniques
 from ...errors import RayscopeError, SceneError
 from .cases import cases
