@@ -92,6 +92,18 @@ def test_too_few_rays_are_no_trial(built):
     assert not quick.rays and soon.leader is dear.leader is short.leader is slow
 
 
+def test_what_trials_lost_is_not_lost_again(built):
+    slow, quick = Slow(built[0], 2e-5), Slow(built[1], 0.0)
+    contest, rays = _contest([slow, quick], 100_000), ray_sets(SCENE, built[0], 8000, 0)[0]
+    contest.spent = 1e3
+    for _ in range(2):
+        rays.ask(contest)
+    assert not quick.rays and contest.leader is slow
+    contest.spent = 0.0
+    rays.ask(contest)
+    assert quick.rays
+
+
 def test_a_batch_counts_as_well_as_a_ray(built):
     """What is slow to begin with, but quick with many rays, gets many rays, and no few."""
     class Heavy(Slow):
