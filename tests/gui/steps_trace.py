@@ -12,6 +12,7 @@ from bl_ext.user_default.rayscope.addon.ui import operators
 folder = Path(sys.argv[sys.argv.index("--") + 2])
 log = {}
 ticks = []
+MOVING = True  # redraws of the whole window would be measured too
 
 
 def watch_the_thread(cpu):
