@@ -10,7 +10,7 @@ import pytest
 from rayscope.core import Camera, Light, Material, Mesh, Object, Scene, World, build, solids, trace
 from rayscope.core.fast.generalised import footprint_tracer
 from rayscope.core.fast.generalised.cone import Cones, Reach
-from rayscope.core.fast.generalised.outlines import points
+from rayscope.core.fast.generalised.aperture import points
 from rayscope.core.fast.generalised.cones_tracer import scattering
 
 from .footprint_scenes import ball_mesh, displayed, lit, rmse, with_area, with_cylinder, with_glass, with_mesh, with_texture

@@ -14,9 +14,9 @@ from ..tracing import sampling
 from ..tracing.secondary import mirrored_and_refracted
 from ..tracing.whitted import KINDS, PRIMARY, REFLECTED, REFRACTED, TRANSPARENT, Wave, Whitted
 from . import clipping
+from .aperture import scattered
 from .beam_clip import in_pixels
 from .beam_walk import SKY
-from .outlines import scattered
 
 #: Pieces whose pixels' points are looked at together.
 ROWS = 4096

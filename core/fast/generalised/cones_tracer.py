@@ -18,10 +18,10 @@ from ...scene.footprints import SHADOW_RAYS, SMALL
 from ..tracing import sampling
 from ..tracing.vectors import dot, frame, pushed, unit
 from ..tracing.whitted import COUNTED, REFLECTED, SHADOW, TRANSPARENT
+from .aperture import points, scattered
 from .cone import Cones
 from .footprint_tracer import ConeWave, FootprintTracer
 from .footprints import FootprintTree
-from .outlines import points, scattered
 
 #: Cones that widen less than by their width along so many times the scene's size are taken as parallel.
 PARALLEL = 1e4

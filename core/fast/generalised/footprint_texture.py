@@ -8,7 +8,7 @@ import numpy as np
 
 from ...scene.footprints import TEXELS
 from ..tracing.vectors import dot
-from .outlines import points
+from .aperture import points
 
 
 def blur(surfaces, pieces, wave, met, surface, u, v):

@@ -16,9 +16,9 @@ from ...scene.footprints import RAYS
 from ..rays import Rays
 from ..tracing import sampling
 from ..tracing.whitted import COUNTED, PRIMARY, Wave, Whitted
+from .aperture import scattered
 from .cone import Cones
 from .footprints import FootprintTree
-from .outlines import scattered
 
 #: Pairs of cones and primitives that are looked at together, about.
 PAIRS = 32_768

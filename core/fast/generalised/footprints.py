@@ -7,7 +7,7 @@ import numpy as np
 from ..hierarchies.bvh import BVH
 from .cone import meeting
 from ...scene.footprints import SMALL, unsupported
-from .outlines import Pieces
+from .pieces import Pieces
 
 
 class FootprintTree(BVH):

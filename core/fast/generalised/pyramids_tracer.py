@@ -10,7 +10,7 @@ import numpy as np
 from ..tracing.whitted import Whitted
 from . import clipping
 from .footprint_tracer import ConeWave, FootprintTracer
-from .outlines import within_lines
+from .half_planes import within_lines
 
 
 class PyramidTracer(FootprintTracer):

@@ -17,11 +17,11 @@ from ..tracing.secondary import mirrored_and_refracted
 from ..tracing.vectors import add, dot, minus, mul, times
 from ..tracing.whitted import KINDS, PRIMARY, REFLECTED, REFRACTED, TRANSPARENT, Path, Whitted
 from . import clipping
+from .aperture import scattered
 from .beam_clip import in_pixels
 from .beam_space import height
 from .beam_tree import share
 from .beam_walk import SKY
-from .outlines import scattered
 
 #: Shadowed parts of pixels smaller than this are not looked at.
 LEAST = 1e-9

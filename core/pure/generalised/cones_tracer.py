@@ -15,10 +15,10 @@ from ...scene.footprints import SHADOW_RAYS, SMALL
 from ..tracing import sampling
 from ..tracing.vectors import add, cross, dot, frame, minus, mul, pushed, times, unit
 from ..tracing.whitted import REFLECTED, SHADOW, TRANSPARENT
+from .aperture import points, scattered
 from .cone import Cone
 from .footprint_tracer import ConePath, FootprintTracer, hit_of
 from .footprints import FootprintTree
-from .outlines import points, scattered
 
 #: Cones that widen less than by their width along so many times the scene's size are taken as parallel.
 PARALLEL = 1e4

@@ -9,7 +9,7 @@ from dataclasses import replace
 
 from ...scene.footprints import TEXELS
 from ..tracing.vectors import add, cross, dot, minus, times
-from .outlines import points
+from .aperture import points
 
 
 def blurred(surfaces, cone, triangle, hit, surface):

@@ -19,10 +19,10 @@ from ..tracing import sampling
 from ..tracing.camera import through
 from ..tracing.vectors import minus, times
 from ..tracing.whitted import KINDS, PRIMARY, Path, Whitted
+from .aperture import scattered
 from .cone import Cone
 from .footprint_texture import blurred
 from .footprints import FootprintTree
-from .outlines import scattered
 
 #: Background is seen where at least so much of a cone is left.
 LEFT = 1e-9

@@ -4,7 +4,9 @@ import math
 
 from ..hierarchies.bvh import BVH
 from ...scene.footprints import SMALL, unsupported
-from .outlines import Flat, Round, pieces_of
+from .flats import Flat
+from .pieces import pieces_of
+from .rounds import Round
 
 
 class FootprintTree(BVH):

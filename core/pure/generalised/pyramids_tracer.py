@@ -9,7 +9,7 @@ from ..tracing.vectors import minus
 from ..tracing.whitted import Whitted
 from . import clipping
 from .footprint_tracer import ConePath, FootprintTracer
-from .outlines import within_lines
+from .half_planes import within_lines
 
 
 class PyramidTracer(FootprintTracer):
