@@ -12,7 +12,7 @@ Matrices are lists of rows; a plane is (normal x, y, z, distance), its height ov
 import math
 from dataclasses import dataclass
 
-from ..tracing.vectors import add, cross, dot, minus, times, unit
+from ...vectors import add, cross, dot, minus, times, unit
 
 #: The window of a light is so many pixels across.
 LIGHT = 1024.0

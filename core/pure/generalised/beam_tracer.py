@@ -11,10 +11,10 @@ import math
 from dataclasses import dataclass
 
 from ...beams import SAMPLES, fragments_notice
+from ...vectors import add, dot, minus, mul, times
 from ..tracing import sampling
 from ..tracing.camera import through
 from ..tracing.secondary import mirrored_and_refracted
-from ..tracing.vectors import add, dot, minus, mul, times
 from ..tracing.whitted import KINDS, PRIMARY, REFLECTED, REFRACTED, TRANSPARENT, Path, Whitted
 from . import clipping
 from .aperture import scattered

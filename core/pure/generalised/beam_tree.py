@@ -6,10 +6,10 @@ Lights cast beams too: what they see is lit (Atherton, Weiler and Greenberg 1978
 
 import math
 
+from ...vectors import add, dot, minus, mul, unit
 from ..structure import Hit
 from ..tracing.optics import refract
 from ..tracing.secondary import index_of_refraction, mirrored_and_refracted
-from ..tracing.vectors import add, dot, minus, mul, unit
 from .beam_clip import area_and_centre, box
 from .beam_space import LIGHT, NOWHERE, REFLECTED, REFRACTED, TRANSPARENT, Beam, eye_beam, light_beams, product
 from .beam_walk import TOLERANCE, Fragment, Walk, carved, distances, outline

@@ -8,10 +8,10 @@ approximation; lights cast beams for their shadows. Rays by themselves are hande
 from collections import Counter
 
 from ...beams import CastsBeams, cells_of, hidden_notices, picture_size
+from ...vectors import add
 from ..directional.second import Handing
 from ..tracing.camera import through
 from ..tracing.surface import Surfaces
-from ..tracing.vectors import add
 from .beam_bsp import Bsp
 from .beam_tree import BeamTree
 

@@ -4,7 +4,7 @@ import math
 from dataclasses import dataclass
 from functools import cached_property
 
-from ..tracing.vectors import add, cross, dot, minus, times
+from ...vectors import add, cross, dot, minus, times
 
 #: Heights above a plane, relative to the distance along it, that are rounding.
 FLAT = 1e-9

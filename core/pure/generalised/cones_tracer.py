@@ -12,8 +12,9 @@ import math
 from dataclasses import replace
 
 from ...scene.footprints import SHADOW_RAYS, SMALL
+from ...vectors import add, cross, dot, minus, mul, times, unit
 from ..tracing import sampling
-from ..tracing.vectors import add, cross, dot, frame, minus, mul, pushed, times, unit
+from ..tracing.vectors import frame, pushed
 from ..tracing.whitted import REFLECTED, SHADOW, TRANSPARENT
 from .aperture import points, scattered
 from .cone import Cone

@@ -2,7 +2,7 @@
 
 import math
 
-from ..tracing.vectors import cross, dot, minus
+from ...vectors import cross, dot, minus
 from .half_planes import covered
 from .outlines import Outline
 

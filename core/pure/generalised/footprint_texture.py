@@ -8,7 +8,7 @@ import math
 from dataclasses import replace
 
 from ...scene.footprints import TEXELS
-from ..tracing.vectors import add, cross, dot, minus, times
+from ...vectors import add, cross, dot, minus, times
 from .aperture import points
 
 

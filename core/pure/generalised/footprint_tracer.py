@@ -13,11 +13,11 @@ import math
 from dataclasses import dataclass, replace
 
 from ...scene.footprints import RAYS
+from ...vectors import minus, times
 from ..ray import Ray
 from ..structure import Hit
 from ..tracing import sampling
 from ..tracing.camera import through
-from ..tracing.vectors import minus, times
 from ..tracing.whitted import KINDS, PRIMARY, Path, Whitted
 from .aperture import scattered
 from .cone import Cone

@@ -5,7 +5,7 @@ meeting of half planes, because the reciprocals of distances are linear. Polygon
 fragments send on, and their shadows, are traced by rays.
 """
 
-from ..tracing.vectors import minus
+from ...vectors import minus
 from ..tracing.whitted import Whitted
 from . import clipping
 from .footprint_tracer import ConePath, FootprintTracer

@@ -2,7 +2,7 @@
 
 import math
 
-from ..tracing.vectors import add, cross, dot, minus
+from ...vectors import add, cross, dot, minus
 from .conics import chords, form
 from .outlines import Outline
 

@@ -3,9 +3,9 @@
 import math
 
 from ...adaptive import ACROSS, DEPTHS, FAR, FIRST, OWN, SPENT, Adaptive, ByVariance
+from ...vectors import add, mul, times
 from . import sampling
 from .camera import through
-from .vectors import add, mul, times
 
 
 def shown(radiance):

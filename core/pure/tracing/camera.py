@@ -1,7 +1,7 @@
 """Primary rays: where they pass through the picture, and where they start."""
 
+from ...vectors import add, times
 from .sampling import PIXEL, pair
-from .vectors import add, times
 
 
 def primary(camera, size, x, y, key):

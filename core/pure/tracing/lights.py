@@ -2,8 +2,9 @@
 
 import math
 
+from ...vectors import add, cross, dot, minus, times, unit
 from .sampling import disc
-from .vectors import add, cross, dot, frame, minus, times, unit
+from .vectors import frame
 
 
 def arriving(light, point, u=None, v=None):

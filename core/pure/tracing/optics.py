@@ -2,7 +2,7 @@
 
 import math
 
-from .vectors import add, dot, minus, times
+from ...vectors import add, dot, minus, times
 
 
 def reflect(d, n, cosine):

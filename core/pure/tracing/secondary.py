@@ -1,7 +1,7 @@
 """Rays that mirrors and glass send on."""
 
+from ...vectors import dot, times, unit
 from .optics import fresnel, keep_side, reflect, refract
-from .vectors import dot, times, unit
 
 
 def index_of_refraction(material):

@@ -2,9 +2,9 @@
 
 import math
 
+from ...vectors import add, dot, minus, mul, times, unit
 from .lights import arriving
 from .sampling import LIGHTS, pair
-from .vectors import add, dot, minus, mul, times, unit
 
 
 def lit(surface, d, lights, transmitted, key):

@@ -1,8 +1,9 @@
 """Light through glass and through surfaces with alpha: a shadow ray that takes on the colour of what it passes."""
 
+from ...vectors import add, dot, mul, times, unit
 from .optics import fresnel, refract
 from .secondary import index_of_refraction
-from .vectors import add, dot, mul, pushed, times, unit
+from .vectors import pushed
 
 
 def passed(surface, d):

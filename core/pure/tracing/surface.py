@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from ...scene.material import Material
 from ...scene.scene import Mesh
 from ...scene.solids import slots
-from .vectors import cross, dot, mul, times, unit
+from ...vectors import cross, dot, mul, times, unit
 
 
 @dataclass(slots=True)

@@ -1,9 +1,8 @@
-"""Vectors as triples, and points that rays leave."""
+"""Frames about a vector, and points that rays leave."""
 
 import math
 
-from ...vectors import add, cross, dot, minus, mul, times, unit  # noqa: F401 -- all that tracers need of vectors
-
+from ...vectors import dot
 
 #: Moves nothing but zeros.
 TINY = 1e-300

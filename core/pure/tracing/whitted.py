@@ -11,11 +11,12 @@ import math
 from dataclasses import dataclass
 
 from ...tracer import COUNTED, KINDS, PRIMARY, REFLECTED, REFRACTED, SHADOW, TRANSPARENT, Tracer
+from ...vectors import add, dot, minus, mul, times, unit
 from . import sampling
 from .camera import primary
 from .probe import Probe
 from .surface import Surfaces
-from .vectors import add, dot, minus, mul, pushed, times, unit
+from .vectors import pushed
 
 
 @dataclass(slots=True)
