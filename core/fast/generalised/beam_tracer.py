@@ -10,6 +10,7 @@ come through glass.
 import numpy as np
 
 from ...beams import SAMPLES, fragments_notice
+from ...sampling import PIXEL
 from ..tracing import sampling
 from ..tracing.secondary import mirrored_and_refracted
 from ..tracing.whitted import KINDS, PRIMARY, REFLECTED, REFRACTED, TRANSPARENT, Wave, Whitted
@@ -282,7 +283,7 @@ class BeamTracer(Whitted):
     def _points(self, pieces, some):
         """The points at which pixels of some pieces are sampled, shape (m, SAMPLES, 2)."""
         key = self._pixel_keys(pieces.pixel[some])
-        u, v = (sampling.number(key, sampling.PIXEL + c)[:, None] for c in range(2))
+        u, v = (sampling.number(key, PIXEL + c)[:, None] for c in range(2))
         s, t = scattered(False, np.arange(SAMPLES), SAMPLES, u, v)
         return np.stack([pieces.x[some, None] + 0.5 * (s + 1.0), pieces.y[some, None] + 0.5 * (t + 1.0)], axis=-1)
 

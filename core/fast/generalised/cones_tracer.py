@@ -14,6 +14,7 @@ from dataclasses import replace
 import numpy as np
 
 from ...hits import Hits
+from ...sampling import LIGHTS
 from ...scene.footprints import SHADOW_RAYS, SMALL
 from ..tracing import sampling
 from ..tracing.vectors import dot, frame, pushed, unit
@@ -157,7 +158,7 @@ class ConeTracer(FootprintTracer):
         number = np.maximum(np.ceil(worth * each), 1.0).astype(np.int64)
         start = np.cumsum(number) - number
         row = np.repeat(np.arange(len(which)), number)
-        dimension = sampling.LIGHTS + 2 * next(i for i, (l, _) in enumerate(self.lights) if l is light)
+        dimension = LIGHTS + 2 * next(i for i, (l, _) in enumerate(self.lights) if l is light)
         u, v = (sampling.number(key, dimension + i)[row] for i in (0, 1))
         e, f, disc = _aperture(light, to)
         s, t = scattered(disc, np.arange(len(row)) - start[row], number[row], u, v)

@@ -2,7 +2,8 @@
 
 import numpy as np
 
-from .sampling import PIXEL, pair
+from ...sampling import PIXEL
+from .sampling import pair
 
 
 def primary(camera, size, pixels, key):

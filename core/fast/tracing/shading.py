@@ -4,8 +4,9 @@ import math
 
 import numpy as np
 
+from ...sampling import LIGHTS
 from .lights import arriving
-from .sampling import LIGHTS, pair
+from .sampling import pair
 from .vectors import columns, dot, unit
 
 

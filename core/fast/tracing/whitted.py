@@ -12,6 +12,7 @@ import math
 
 import numpy as np
 
+from ...sampling import ROULETTE
 from ...tracer import COUNTED, KINDS, PRIMARY, REFLECTED, REFRACTED, SHADOW, TRANSPARENT, Tracer
 from ..rays import blocks, part
 from . import sampling
@@ -379,7 +380,7 @@ class Whitted(Tracer):
         most = weight.max(axis=0)
         kept = most >= self.threshold
         if self.roulette:
-            won = ~kept & (sampling.number(key, sampling.ROULETTE) * self.threshold < most)
+            won = ~kept & (sampling.number(key, ROULETTE) * self.threshold < most)
             weight[:, won] *= self.threshold / most[won]
             kept |= won
         self.tally[KINDS[kind]]["saved"] += len(kept) - int(np.count_nonzero(kept))

@@ -11,6 +11,7 @@ import math
 from dataclasses import dataclass
 
 from ...beams import SAMPLES, fragments_notice
+from ...sampling import MASK, PIXEL
 from ...vectors import add, dot, minus, mul, times
 from ..tracing import sampling
 from ..tracing.camera import through
@@ -201,12 +202,12 @@ class BeamTracer(Whitted):
     def _key(self, x, y, beam, surface, sample=0):
         """Key of random numbers, the same in both cores."""
         key = sampling.first_key(y * self.size[0] + x, sample, self.seed)
-        return sampling.mix((key + ((surface + 2) * 1024 + beam.depth) * 8 + beam.kind) & sampling.MASK)
+        return sampling.mix((key + ((surface + 2) * 1024 + beam.depth) * 8 + beam.kind) & MASK)
 
     def _points(self, x, y):
         """The points at which a pixel is sampled."""
         key = sampling.first_key(y * self.size[0] + x, 0, self.seed)
-        u, v = sampling.number(key, sampling.PIXEL), sampling.number(key, sampling.PIXEL + 1)
+        u, v = sampling.number(key, PIXEL), sampling.number(key, PIXEL + 1)
         places = (scattered(False, k, SAMPLES, u, v) for k in range(SAMPLES))
         return [(x + 0.5 * (s + 1.0), y + 0.5 * (t + 1.0)) for s, t in places]
 

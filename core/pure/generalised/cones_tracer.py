@@ -11,6 +11,7 @@ is worth no more than a few rays (see :mod:`.footprint_tracer`) has shadow rays 
 import math
 from dataclasses import replace
 
+from ...sampling import LIGHTS
 from ...scene.footprints import SHADOW_RAYS, SMALL
 from ...vectors import add, cross, dot, minus, mul, times, unit
 from ..tracing import sampling
@@ -152,7 +153,7 @@ class ConeTracer(FootprintTracer):
     def _open_to_rays(self, surface, to, reach, light, key, worth):
         """Share of a light that is not hidden, by as many rays as the surface is worth."""
         n, total = max(math.ceil(worth), 1), (0.0, 0.0, 0.0)
-        dimension = sampling.LIGHTS + 2 * next(i for i, (l, _) in enumerate(self.lights) if l is light)
+        dimension = LIGHTS + 2 * next(i for i, (l, _) in enumerate(self.lights) if l is light)
         u, v = sampling.number(key, dimension), sampling.number(key, dimension + 1)
         e, f, disc = _aperture(light, to)
         for k in range(n):

@@ -12,6 +12,7 @@ for that reason, however many surfaces rays are sent on by, and the expected val
 import math
 from dataclasses import dataclass, replace
 
+from ...sampling import MASK
 from ...scene.footprints import RAYS
 from ...vectors import minus, times
 from ..ray import Ray
@@ -55,7 +56,7 @@ class ConePath(Path):
         o, d = self.cone.ray(s, t)
         width = math.sqrt(share)
         cone = replace(self.cone, o=o, d=d, e=times(width, self.cone.e), f=times(width, self.cone.f))
-        key = sampling.mix((self.key + rank) & sampling.MASK)
+        key = sampling.mix((self.key + rank) & MASK)
         return ConePath.along(cone, times(share, self.weight), self.depth, self.kind, key)
 
     def as_ray(self):

@@ -1,7 +1,8 @@
 """Primary rays: where they pass through the picture, and where they start."""
 
+from ...sampling import PIXEL
 from ...vectors import add, times
-from .sampling import PIXEL, pair
+from .sampling import pair
 
 
 def primary(camera, size, x, y, key):

@@ -2,9 +2,10 @@
 
 import math
 
+from ...sampling import LIGHTS
 from ...vectors import add, dot, minus, mul, times, unit
 from .lights import arriving
-from .sampling import LIGHTS, pair
+from .sampling import pair
 
 
 def lit(surface, d, lights, transmitted, key):

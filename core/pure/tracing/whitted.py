@@ -10,6 +10,7 @@ Modules for lights, glass, mirrors and textures are imported only for a scene th
 import math
 from dataclasses import dataclass
 
+from ...sampling import ROULETTE
 from ...tracer import COUNTED, KINDS, PRIMARY, REFLECTED, REFRACTED, SHADOW, TRANSPARENT, Tracer
 from ...vectors import add, dot, minus, mul, times, unit
 from . import sampling
@@ -248,7 +249,7 @@ class Whitted(Tracer):
         most = max(weight)
         if most >= self.threshold:
             return weight
-        if self.roulette and sampling.number(key, sampling.ROULETTE) * self.threshold < most:
+        if self.roulette and sampling.number(key, ROULETTE) * self.threshold < most:
             return times(self.threshold / most, weight)
         self.tally[KINDS[kind]]["saved"] += 1
         return None
