@@ -1,10 +1,12 @@
 """Scenes and rays that all techniques are tried on; most of them stiff in one way."""
+
 import math
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from rayscope.core import Scene, solids
+from rayscope.core.lab.stability.scenes import coplanar, degenerate, far_vertex, identical, moved_ball, sheet, soup
 from rayscope.core.scene.scene import Mesh, Object, Shapes
 
 
@@ -27,12 +29,6 @@ class Dataset:
         return rays_for(scene, np.random.default_rng([seed, 1, *self.name.encode()]))
 
 
-def soup(corners, rng=None):
-    """A scene of loose triangles, shape (n, 3, 3)."""
-    corners = np.asarray(corners, float).reshape(-1, 3)
-    return Scene.from_triangles(corners, np.arange(len(corners)).reshape(-1, 3))
-
-
 def random_soup(rng, n=60, size=0.3):
     return soup(rng.random((n, 1, 3)) + size * rng.normal(size=(n, 3, 3)))
 
@@ -40,50 +36,6 @@ def random_soup(rng, n=60, size=0.3):
 def tiny_and_huge(rng):
     small = rng.random((40, 1, 3)) + 1e-5 * rng.normal(size=(40, 3, 3))
     return soup(np.concatenate([small, 50.0 * rng.normal(size=(6, 3, 3))]))
-
-
-def jittered_sphere(rng, rows=10, centre=(0.0, 0.0, 0.0)):
-    """A closed mesh: a unit sphere whose vertices were moved at random."""
-    polar, around = np.meshgrid(np.linspace(0.0, math.pi, rows + 1)[1:-1], np.linspace(0.0, math.tau, rows, endpoint=False), indexing="ij")
-    ring = np.stack([np.sin(polar) * np.cos(around), np.sin(polar) * np.sin(around), np.cos(polar)], axis=-1).reshape(-1, 3)
-    vertices = np.concatenate([ring, [(0.0, 0.0, 1.0), (0.0, 0.0, -1.0)]])
-    vertices = vertices * (1.0 + 0.02 * rng.normal(size=(len(vertices), 1))) + np.asarray(centre)
-    top, bottom, triangles = len(ring), len(ring) + 1, []
-    for k in range(rows):
-        following = (k + 1) % rows
-        triangles += [(top, k, following), (bottom, (rows - 2) * rows + following, (rows - 2) * rows + k)]
-        for row in range(rows - 2):
-            a, b, c, d = row * rows + k, row * rows + following, (row + 1) * rows + k, (row + 1) * rows + following
-            triangles += [(a, c, d), (a, d, b)]
-    return Scene.from_triangles(vertices, triangles)
-
-
-def plane(rng, n=6, z=0.25):
-    """An axis-aligned plane of squares: no extent along z, vertices on the planes of division."""
-    x, y = np.meshgrid(np.arange(n + 1.0), np.arange(n + 1.0), indexing="ij")
-    vertices = np.stack([x.ravel(), y.ravel(), np.full(x.size, z)], axis=1)
-    corner = (np.arange(n)[:, None] * (n + 1) + np.arange(n)).ravel()
-    a, b, c, d = corner, corner + n + 1, corner + n + 2, corner + 1
-    return Scene.from_triangles(vertices, np.concatenate([np.stack([a, b, c], 1), np.stack([a, c, d], 1)]))
-
-
-def coplanar(rng):
-    corners = rng.random((40, 3, 3))
-    corners[..., 0] = -3.0
-    return soup(corners)
-
-
-def identical(count):
-    return lambda rng: soup(np.broadcast_to([[(0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.5)]], (count, 3, 3)))
-
-
-def degenerate(rng):
-    """Triangles without area, and numbers that are none, with good neighbours."""
-    point, line = rng.random((5, 1, 3)).repeat(3, axis=1), rng.random((5, 1, 3)) * np.array([[0.0], [1.0], [2.5]])
-    pbrt = [[(-1113.45459, -79.049614, -56.2431908), (-1113.45459, -87.0922699, -56.2431908), (-1113.45459, -79.2090149, -56.2431908)]]
-    broken = rng.random((4, 3, 3))
-    broken[0, 1, 0], broken[1, 0, 2], broken[2, 2] = math.nan, math.inf, -math.inf
-    return soup(np.concatenate([point, line, pbrt, broken, rng.random((30, 3, 3))]))
 
 
 def on_a_line(rng):
@@ -94,10 +46,9 @@ def at_a_point(rng):
     return soup(np.full((20, 3, 3), 0.5))
 
 
-def far_vertex(rng):
-    corners = rng.random((20, 3, 3))
-    corners[7, 1] = 1e38
-    return soup(corners)
+def jittered_sphere(rng, rows=10, centre=(0.0, 0.0, 0.0)):
+    """A closed mesh: a unit sphere whose vertices were moved at random."""
+    return moved_ball(1.0, centre, rows)(rng)
 
 
 def slivers(rng):
@@ -153,7 +104,7 @@ DATASETS = (
     Dataset("random soup", random_soup),
     Dataset("tiny and huge", tiny_and_huge),
     Dataset("closed mesh", jittered_sphere),
-    Dataset("plane", plane),
+    Dataset("plane", sheet),
     Dataset("coplanar", coplanar),
     Dataset("one", identical(1)),
     Dataset("two identical", identical(2)),

@@ -177,7 +177,7 @@ def test_grid_follows_woos_rule():
     index = build(datasets.soup(corners), "grid", "pure", density=1.0)
     along = 500 ** (1 / 3)
     assert index.resolution[0] == int(along) and index.resolution[1] in (int(along / 2), int(along / 2) - 1)
-    assert build(datasets.plane(rng), "grid", "pure", resolution=12).resolution == [12, 12, 1]
+    assert build(datasets.sheet(rng), "grid", "pure", resolution=12).resolution == [12, 12, 1]
 
 
 def test_grid_too_fine_is_refused_before_it_is_made():
