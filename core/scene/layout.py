@@ -109,14 +109,9 @@ def _local_corners(geometry):
         referenced[used.ravel()] = True
         points = geometry.vertices[referenced]
         lo, hi = points.min(axis=0), points.max(axis=0)
+    elif geometry.box is None:
+        return None
     else:
-        from .placed import faults
-        from .scene import Object
-        from .solids import bounds
-        bad = {k for _, k, _ in faults([Object("", geometry)])}
-        boxes = [bounds(s) for k, s in enumerate(geometry.solids) if k not in bad]
-        if not boxes:
-            return None
-        lo, hi = np.min([b[0] for b in boxes], axis=0), np.max([b[1] for b in boxes], axis=0)
+        lo, hi = geometry.box
     pick = np.array([[i >> 2 & 1, i >> 1 & 1, i & 1] for i in range(8)], bool)
     return np.where(pick, hi, lo)

@@ -5,6 +5,7 @@ right-handed, z up, in Blender units.
 """
 
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 
@@ -93,6 +94,15 @@ class Shapes:
         self.corner_normals = np.zeros((len(self.solids), 3, 3), np.float32) if smooth else None
         for k in smooth:
             self.corner_normals[k] = self.solids[k].values["normals"]
+
+    @cached_property
+    def box(self):
+        """Box (lo, hi) of the solids that can be used, two arrays of 3; None where there are none."""
+        from .placed import faults
+        from .solids import bounds
+        bad = {k for _, k, _ in faults([Object("", self)])}
+        boxes = [bounds(s) for k, s in enumerate(self.solids) if k not in bad]
+        return (np.min([lo for lo, _ in boxes], axis=0), np.max([hi for _, hi in boxes], axis=0)) if boxes else None
 
     def __len__(self):
         return len(self.solids)

@@ -3,7 +3,7 @@ import math
 
 import numpy as np
 import pytest
-from rayscope.core import Scene, SceneError, build, solids
+from rayscope.core import Camera, Light, Scene, SceneError, build, solids, trace
 from rayscope.core.scene.layout import Layout, inverse, mirrors, object_bounds, to_world
 from rayscope.core.scene.scene import Mesh, Object, Shapes
 
@@ -61,6 +61,17 @@ def test_bounds_follow_the_matrix():
     assert lo.tolist() == [8.0, 0.0, 0.0] and hi.tolist() == [10.0, 2.0, 0.0]
     lo, hi = object_bounds([Object("ball", Shapes([solids.sphere((1, 2, 3), 0.5)]))])
     assert lo[0] == pytest.approx([0.5, 1.5, 2.5]) and hi[0] == pytest.approx([1.5, 2.5, 3.5])
+
+
+def test_solids_are_walked_once_for_the_bounds_of_many_pictures(monkeypatch):
+    walked = []
+    monkeypatch.setattr(solids, "bounds", lambda s, bounds=solids.bounds: walked.append(s) or bounds(s))
+    balls, flat = [solids.sphere((x, 0, 0), 1.0) for x in (0, 5)], solids.sphere((99, 0, 0), 0.0)
+    scene = Scene([Object("balls", Shapes([*balls, flat]))], [Light("", "point", (1, 1, 1), (0, 0, 3))], Camera(np.eye(4)))
+    for core in ("fast", "pure"):
+        trace(scene, core=core, size=(2, 2))
+    assert [corner.tolist() for corner in scene.bounds()] == [[-1, -1, -1], [6, 1, 1]]
+    assert walked == balls
 
 
 def test_solids_become_one_object():
