@@ -15,6 +15,8 @@ DOUBTFUL = 2.0**-16
 #: triangles are badly determined. Beyond what is allowed t is calculated again: from near by (:func:`nearby`), where the looseness alone
 #: allows that, else exactly (:func:`crossing`).
 ALLOWED = 8.0
+#: By how much of its distance rounding moves a vertex sideways, as the watertight test sees it: at most.
+SEEN = 2.0**-50
 #: Dekker's factor: splits 53 bits into 26 and 27.
 SPLIT = 2.0**27 + 1.0
 
@@ -54,6 +56,36 @@ def rounding(a, b, c):
     return area, extent * (area + extent * extent)
 
 
+def stretch(x, y, t, far):
+    """The least and the most t of those points of a triangle that a ray passes: seen edge-on, from one edge to another.
+
+    Parameters
+    ----------
+    x, y, t : sequence of 3 float
+        The sheared vertices: the ray runs through (0, 0), and is at t beside them.
+    far : float
+        The most that they are away from the ray's origin: where they are seen is off by as much as that is rounded.
+
+    Returns
+    -------
+    (low, high)
+        inf and -inf where there are none.
+    """
+    s = x if max(x) - min(x) >= max(y) - min(y) else y
+    slack, low, high = SEEN * far, math.inf, -math.inf
+    for i in range(3):
+        begin, end, span = t[i - 1], t[i], s[i] - s[i - 1]
+        if span:
+            ends = (-slack - s[i - 1]) / span, (slack - s[i - 1]) / span
+            first, last = max(min(ends), 0.0), min(max(ends), 1.0)
+        else:
+            first, last = 0.0, 1.0 if abs(s[i]) <= slack else -1.0
+        if first <= last:
+            ends = begin + first * (end - begin), begin + last * (end - begin)
+            low, high = min(low, *ends), max(high, *ends)
+    return low, high
+
+
 def refined(o, d, corners, t, low, high, deep):
     """t once more, where a line crosses the plane of a triangle.
 
@@ -66,12 +98,12 @@ def refined(o, d, corners, t, low, high, deep):
     t : float
         As the watertight test has it.
     low, high : float
-        The least and the most t of the vertices.
+        See :func:`stretch`.
     deep : bool
         Exactly, instead of from near by.
     """
     found = crossing(o, d, *corners) if deep else nearby(o, d, *corners, t)
-    slack = 2.0**-50 * abs(t)
+    slack = 2.0**-50 * max(abs(low), abs(high))
     return min(max(found, low), high) if low - slack <= found <= high + slack else t
 
 

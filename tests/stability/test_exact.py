@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 from rayscope.core import Scene, build
 from rayscope.core.lab import exact
+from rayscope.core.lab.stability.rays import in_the_plane
+from rayscope.core.lab.stability.trial import asked
 from rayscope.core.pure.ray import Ray
 from rayscope.core.pure.watch import Watch
 
@@ -157,3 +159,37 @@ def test_crossings_that_are_none():
     rows = np.array([(0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0), (0.0, 0.0, 0.0, 1.0, 1.0, 1.0, 2.0, 2.0, 2.0)]).T
     o, d = np.array([(0.2, 0.2, 1.0)] * 2).T, np.array([(1.0, 0.0, 0.0), (0.0, 0.0, -1.0)]).T
     assert np.isnan(crossings(o, d, rows, np.ones(2))).all()
+
+
+@pytest.mark.parametrize("core", ["pure", "fast"])
+@pytest.mark.parametrize("away", [0.0, 1e3])
+def test_a_ray_in_the_plane_of_a_triangle_is_said_to_meet_it_where_it_is(core, away):
+    """Rays and triangles in one tilted plane all but for rounding: where lines cross the planes is anywhere, but the hit has to be on the triangle."""
+    rng = np.random.default_rng(11)
+    x, y = rng.random((2, 60, 3))
+    corners = np.stack([x, y, 0.3 * x + 0.7 * y], axis=-1) + away
+    scene = Scene.from_triangles(corners.reshape(-1, 3), np.arange(180).reshape(-1, 3))
+    batch = in_the_plane(scene, rng, 150)
+    hits = asked(batch, build(scene, "brute", core))
+    found, largest = np.flatnonzero(hits.primitive >= 0), max(np.abs(batch.o).max(), np.abs(corners).max())
+    assert len(found) > 80
+    for r in found:
+        at = [Fraction(p) + Fraction(float(hits.t[r])) * Fraction(q) for p, q in zip(batch.o[r].tolist(), batch.d[r].tolist())]
+        assert math.sqrt(exact.squared_distance(at, *corners[hits.primitive[r]].tolist())) <= 16.0 * 2.0**-52 * largest
+
+
+def test_stretches_of_triangles_that_rays_pass():
+    from rayscope.core.fast.primitives.exact_crossing import stretches
+    from rayscope.core.scene.exact import stretch
+    # Edge-on along y: from the edge a b to the edge a c; through the vertex a; along an edge; beside it.
+    assert stretch((-1.0, 1.0, 3.0), (0.0, 0.0, 0.0), (0.0, 2.0, 8.0), 1e-9) == pytest.approx((1.0, 2.0), abs=1e-8)
+    assert stretch((0.0, 1.0, 3.0), (0.0, 0.0, 0.0), (5.0, 2.0, 8.0), 0.0) == (5.0, 5.0)
+    assert stretch((0.0, 0.0, 3.0), (0.0, 0.0, 0.0), (5.0, 2.0, 8.0), 0.0) == (2.0, 5.0)
+    assert stretch((1.0, 2.0, 3.0), (0.0, 0.0, 0.0), (5.0, 2.0, 8.0), 1.0) == (math.inf, -math.inf)
+    rng = np.random.default_rng(3)
+    x, y, t = rng.normal(size=(3, 3, 200))
+    x[:, ::3] *= 1e-17
+    x[0, ::5] = x[1, ::5]
+    far = 10.0 ** rng.uniform(-3, 16, 200)
+    for k, both in enumerate(zip(*stretches(x, y, t, far))):
+        assert both == stretch(x[:, k].tolist(), y[:, k].tolist(), t[:, k].tolist(), far[k])

@@ -10,7 +10,7 @@ as many as a float has, and t is still right. The results are those of :mod:`~ra
 import numpy as np
 
 from ...scene import exact
-from ...scene.exact import SPLIT
+from ...scene.exact import SEEN, SPLIT
 from .exact_edges import product
 
 #: Below so many hits plain Python is quicker than numpy's calls.
@@ -47,6 +47,24 @@ class Asked:
         return outside | (least > self.t_min) & (most < self.t_far) if self.any_hit else outside
 
 
+def stretches(x, y, t, far):
+    """The least and the most t that triangles have where rays pass them, as :func:`~rayscope.core.scene.exact.stretch`; of each shape (3, m)."""
+    wide = x.max(axis=0) - x.min(axis=0) >= y.max(axis=0) - y.min(axis=0)
+    s, slack = np.where(wide, x, y), SEEN * far
+    low, high = np.full(len(far), np.inf), np.full(len(far), -np.inf)
+    for i in range(3):
+        begin, way, span = t[i - 1], t[i] - t[i - 1], s[i] - s[i - 1]
+        with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+            ends = (-slack - s[i - 1]) / span, (slack - s[i - 1]) / span
+            first, last = np.maximum(np.minimum(*ends), 0.0), np.minimum(np.maximum(*ends), 1.0)
+            along = span == 0.0
+            first[along], last[along] = 0.0, np.where(np.abs(s[i][along]) <= slack[along], 1.0, -1.0)
+            ends, passed = (begin + first * way, begin + last * way), first <= last
+            low = np.where(passed, np.minimum(low, np.minimum(*ends)), low)
+            high = np.where(passed, np.maximum(high, np.maximum(*ends)), high)
+    return low, high
+
+
 def refined(o, d, rows, t, low, high, deep, asked):
     """As :func:`~rayscope.core.scene.exact.refined`, for m hits; but where less tells what is asked, only as well as that takes.
 
@@ -72,7 +90,7 @@ def refined(o, d, rows, t, low, high, deep, asked):
         if which.any():
             within = low[which], high[which], asked.take(which)
             found[which] = function(o[:, which], d[:, which], rows[:, which], t[which], *(within if function is crossings else ()))
-    slack = 2.0**-50 * np.abs(t)
+    slack = 2.0**-50 * np.maximum(np.abs(low), np.abs(high))
     return np.where((found >= low - slack) & (found <= high + slack), np.minimum(np.maximum(found, low), high), t)
 
 

@@ -13,7 +13,7 @@ from ...scene.exact import ALLOWED, DOUBTFUL, collinear
 from ...scene.layout import mirrors, to_world
 from ..rays import taken
 from .cut import boxes_inside
-from .exact_crossing import Asked, refined
+from .exact_crossing import Asked, refined, stretches
 from .exact_edges import edge_functions
 
 #: gamma(7): relative error of a point interpolated from three vertices (Pharr et al., PBR 4th ed., 6.8.5).
@@ -124,7 +124,7 @@ class Triangles:
                 v /= det
                 w /= det
         ends = rays.t_min.take(ray), t_far.take(ray)
-        self._mend_t(rays, ray, item, t, z, sz, seen, inside, Asked(*ends, any_hit))
+        self._mend_t(rays, ray, item, t, (x, y, z), sz, seen, inside, Asked(*ends, any_hit))
         good = np.flatnonzero((t >= ends[0]) & (t <= ends[1]) & np.isfinite(t) & inside)
         if any_hit:
             return [good if pair is None else pair.take(good)]
@@ -178,7 +178,7 @@ class Triangles:
             for column, value in zip(edges, (*exact, exact[0] + exact[1] + exact[2])):
                 column[doubtful] = value
 
-    def _mend_t(self, rays, ray, item, t, z, sz, seen, inside, asked):
+    def _mend_t(self, rays, ray, item, t, seen_at, sz, seen, inside, asked):
         """Put t right where it may be off by more than is allowed: seen at a grazing angle, or narrow; as far as that matters."""
         # Most triangles are never so, wherever they are met.
         some = np.flatnonzero(~(seen >= self.rounding[2].take(item)) & inside)
@@ -194,8 +194,8 @@ class Triangles:
         some, asked, deep = some[open_], asked.take(open_), (loose > bound)[open_]
         if not len(some):
             return
-        at, z = ray.take(some), [c.take(some) for c in z]
-        low, high = np.minimum(np.minimum(z[0], z[1]), z[2]), np.maximum(np.maximum(z[0], z[1]), z[2])
+        at, (x, y, z) = ray.take(some), (np.stack([c.take(some) for c in axis]) for axis in seen_at)
+        low, high = stretches(x, y, z, np.abs(z).max(axis=0) / scale[open_])
         rows = self._flat.reshape(-1, 9).take(item.take(some), axis=0).T
         o, d = (taken(columns, at) for columns in (rays.o, rays.d))
         t[some] = refined(o, d, rows, t.take(some), low, high, deep, asked)

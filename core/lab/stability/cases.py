@@ -10,7 +10,7 @@ from .rays import (aimed_inside, axis_rays, bad_rays, cube_rays, few, from_nowhe
                    to_lights, touching, window_rays, with_ends)
 from .scenes import (LOST, PBRT, blocks, copies, coplanar, corner_blocks, degenerate, far_vertex, fuzz, identical, lit,
                      moved_ball, nested_boxes, random_soup, room_of_solids, shapes,
-                     sheet, shells, slivers, solids_under_matrices, soup, spheres, stadium, star, tangent_spheres)
+                     sheet, shells, slivers, solids_under_matrices, soup, spheres, stadium, star, tangent_spheres, tilted)
 
 TRIANGLES = frozenset({"triangle"})
 
@@ -157,6 +157,7 @@ def cases(full=False):
         Case("spheres far away", spheres(1.0, 1e6), mixed_rays, kinds=frozenset({"sphere"})),
         Case("random bits", fuzz, fuzzy_rays, exact=False, told=("Mesh",)),
         Case("seen edge-on", identical(30), in_the_plane),
+        Case("in a tilted plane", tilted, in_the_plane),
         Case("direction cube and blocks", blocks, cube_rays),
         Case("direction cube and ball", moved_ball(), cube_rays),
         Case("direction cube and solids", shapes, cube_rays,

@@ -126,6 +126,12 @@ def coplanar(rng):
     return soup(corners)
 
 
+def tilted(rng):
+    """Triangles in one plane all but for rounding, which is along no axis."""
+    x, y = rng.random((2, 60, 3))
+    return soup(np.stack([x, y, 0.3 * x + 0.7 * y], axis=-1))
+
+
 PBRT = (
     (-1113.45459, -79.049614, -56.2431908),
     (-1113.45459, -87.0922699, -56.2431908),

@@ -7,7 +7,7 @@ ray cannot slip between them.
 
 import math
 
-from ...scene.exact import ALLOWED, DOUBTFUL, refined, rounding, watertight
+from ...scene.exact import ALLOWED, DOUBTFUL, refined, rounding, stretch, watertight
 from ...scene.layout import mirrors, to_world
 from . import Primitive
 
@@ -123,7 +123,8 @@ class Triangle(Primitive):
         distance = abs(t / sz)
         bound = seen * (ALLOWED * max(distance, self.size) - distance)
         if distance * area + loose > bound:
-            t = refined(ray.o, ray.d, (a, b, c), t, min(ta, tb, tc), max(ta, tb, tc), loose > bound)
+            within = stretch((ax, bx, cx), (ay, by, cy), (ta, tb, tc), max(abs(ta), abs(tb), abs(tc)) / abs(sz))
+            t = refined(ray.o, ray.d, (a, b, c), t, *within, loose > bound)
         if not (ray.t_min <= t <= t_far and math.isfinite(t)):
             return None
         return t, v / det, w / det, 0
