@@ -189,13 +189,7 @@ class BeamTracer(Whitted):
                 key = self._key(x, y, f.beam, f.surface, k)
                 stack += self._rays_for(f, own.cut_off, xy, own.area / len(points), key)
         while stack:
-            for path, hit, surface in self._met(stack.pop()):
-                if surface is None:
-                    radiance = add(radiance, mul(path.weight, self._sky(path.d)))
-                    continue
-                shown = self._seen(surface, path.d, path.key if self.soft else None)
-                radiance = add(radiance, mul(path.weight, times(surface.alpha, shown)))
-                stack += self._onward(path, hit, surface)
+            radiance = self._with(radiance, self._met(stack.pop()), stack)
         first = self._first(*self._at_middle(middle, (x + 0.5, y + 0.5)))
         return {"combined": radiance, **self.spent, **first}
 

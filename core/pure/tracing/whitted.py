@@ -103,14 +103,19 @@ class Whitted(Tracer):
         while stack:
             parts = self._met(stack.pop())
             first = first or self._of_most(parts)
-            for path, hit, surface in parts:
-                if surface is None:
-                    radiance = add(radiance, mul(path.weight, self._sky(path.d)))
-                    continue
-                seen = self._seen(surface, path.d, path.key if self.soft else None)
-                radiance = add(radiance, mul(path.weight, times(surface.alpha, seen)))
-                stack += self._onward(path, hit, surface)
+            radiance = self._with(radiance, parts, stack)
         return {"combined": radiance, **self.spent, **(self._first(*first) if with_first else {})}
+
+    def _with(self, radiance, parts, stack):
+        """Radiance, and what the parts of a path add to it; what they send on is put onto the stack."""
+        for path, hit, surface in parts:
+            if surface is None:
+                radiance = add(radiance, mul(path.weight, self._sky(path.d)))
+                continue
+            seen = self._seen(surface, path.d, path.key if self.soft else None)
+            radiance = add(radiance, mul(path.weight, times(surface.alpha, seen)))
+            stack += self._onward(path, hit, surface)
+        return radiance
 
     def _met(self, path):
         """What a path met: a list with the path as it goes on, the hit, and its surface; of a ray, just one."""
