@@ -35,6 +35,9 @@ class Camera:
     far: float = math.inf
     name: str = "Camera"
 
+    def __post_init__(self):
+        self.window = tuple(map(float, self.window))    # plain numbers, whoever calculated them
+
     @classmethod
     def look_at(cls, position, target, up=(0.0, 0.0, 1.0), angle=math.radians(45.0), aspect=1.0, **more):
         """A perspective camera at `position` that looks at `target`; `angle` is the full vertical field of view."""

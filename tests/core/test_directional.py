@@ -297,6 +297,19 @@ def test_light_buffers_within_limits(core, max_bytes, resolution):
 
 
 @pytest.mark.parametrize("core", CORES)
+def test_room_is_made_by_giving_up_a_light_that_no_ray_has_gone_to(core):
+    """Found at random: rays that go to one light only, where two do not fit."""
+    lights = [Light("first", "point", (1.0, 1.0, 1.0), (0.0, 0.0, 3.0)), Light("second", "point", (1.0, 1.0, 1.0), (4.0, 0.0, 0.0))]
+    scene = jittered_sphere(np.random.default_rng(0))
+    scene = Scene(scene.objects, lights)
+    index, brute = (build(scene, name, core, **more) for name, more in (("light-buffer", {"max_bytes": 1e3}), ("brute", {})))
+    o = np.random.default_rng(5).normal(size=(20, 3))
+    d = lights[1].position - o
+    assert list(index.occluded(o, d, t_max=1.0)) == list(brute.occluded(o, d, t_max=1.0))
+    assert list(index.buffers) == [1]
+
+
+@pytest.mark.parametrize("core", CORES)
 def test_what_does_not_fit_is_told_with_the_picture(core):
     from rayscope.core import trace
     scene = jittered_sphere(np.random.default_rng(0))

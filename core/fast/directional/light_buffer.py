@@ -122,7 +122,7 @@ class LightBuffer(Handing):
         while len(self.buffers) > 1 and self._total[3] > self.max_bytes:
             oldest = next(iter(self.buffers))
             del self.buffers[oldest]
-            self._total -= self._used.pop(oldest)
+            self._total -= self._used.pop(oldest, 0)                   # 0 of one that no ray has gone to yet
         cells, empty, entries, used = self._total.tolist()
         second = self._second.figures["memory"] if self._second is not None else 0
         self.figures.update(N_E=cells, N_EE=empty, N_ER=entries, memory=used + second)
