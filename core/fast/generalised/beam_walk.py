@@ -11,7 +11,7 @@ import numpy as np
 
 from .beam_bsp import heights
 from .beam_clip import expanded, joined, widened
-from .clipping import cut, sides
+from .clipping import area, cut, sides
 
 #: Lines nearer than this to a corner, in pixels, pass through it.
 TOLERANCE = 1e-10
@@ -260,7 +260,7 @@ def outlines(beams, beam, points, count, plane, turn):
     line : ndarray, shape (m, v + 2, 3)
         Inside positive, distances in pixels; the last two keep within the beam's half-spaces.
     seen : ndarray, shape (m,), bool
-        False for faces seen edge-on, or outside of the half-spaces.
+        False for faces seen edge-on, narrower than lines are told apart, or outside of the half-spaces.
     h : ndarray, shape (m, v, 3)
         Corners in the picture: x w, y w, w.
     """
@@ -271,7 +271,7 @@ def outlines(beams, beam, points, count, plane, turn):
     line = np.zeros((m, v + 2, 3))
     line[:, :v] = np.cross(h, np.roll(h, -1, axis=1)) * (np.sign(sight) * beams.hand[beam] * turn)[:, None, None]
     line[:, :v][np.arange(v) >= count[:, None]] = 0.0
-    seen = np.abs(sight) > EDGE_ON
+    seen = (np.abs(sight) > EDGE_ON) & ~_narrow(h)
     for k, limit in enumerate((beams.start[beam], beams.end[beam])):
         side = sides(*heights(points, limit))
         seen &= (side > 0).any(axis=1)
@@ -286,6 +286,15 @@ def outlines(beams, beam, points, count, plane, turn):
     line /= np.where(none, 1.0, size)[..., None]
     line[none] = (0.0, 0.0, 1.0)
     return line, seen, h
+
+
+def _narrow(h):
+    """Whether faces are nowhere wider than the tolerance: lines around them may enclose anything."""
+    w = h[..., 2]
+    front = (w > 0.0).all(axis=1)
+    corners = h[..., :2] / np.where(front[:, None], w, 1.0)[..., None]
+    with np.errstate(over="ignore", invalid="ignore"):
+        return front & (np.abs(area(corners)) <= TOLERANCE * np.ptp(corners, axis=1).max(axis=1))
 
 
 def _apart(points, h):

@@ -10,7 +10,7 @@ import math
 from dataclasses import dataclass
 
 from .beam_bsp import Node, sides_of
-from .clipping import cut, sides
+from .clipping import area, cut, sides
 from .beam_space import height
 
 #: Lines nearer than this to a corner, in pixels, pass through it.
@@ -152,13 +152,15 @@ def inside(planes, thing):
 def outline(beam, points, plane, turn):
     """Lines around a face in the picture of a beam, inside positive, distances in pixels; and its corners (x w, y w, w).
 
-    No lines for a face seen edge-on, or outside of the half-spaces that the beam is confined to.
+    No lines for a face seen edge-on, narrower than lines are told apart, or outside of the half-spaces that the beam is confined to.
     """
     sight = beam.sight(plane)
     if abs(sight) <= EDGE_ON:
         return [], []
     x, y, _, w = beam.map
     corners = [tuple(height(row, p) for row in (x, y, w)) for p in points]
+    if narrow(corners):
+        return [], []
     sign = math.copysign(1.0, sight) * beam.hand * turn
     lines = []
     for (a, b, c), (d, e, f) in zip(corners, corners[1:] + corners[:1]):
@@ -177,6 +179,14 @@ def outline(beam, points, plane, turn):
         if size > 0.0:
             out.append((a / size, b / size, c / size))
     return out, corners
+
+
+def narrow(corners):
+    """Whether a face is nowhere wider than the tolerance: lines around it may enclose anything."""
+    if min(w for _, _, w in corners) <= 0.0:
+        return False
+    seen = [(x / w, y / w) for x, y, w in corners]
+    return abs(area(seen)) <= TOLERANCE * max(max(c) - min(c) for c in zip(*seen))
 
 
 def distances(line, points):
