@@ -33,7 +33,7 @@ def run(tmp_path, source, monkeypatch=None, names=("friendly", "many identical",
         some = [case for case in check.cases.cases() if case.name in names]
         monkeypatch.setattr(check.cases, "cases", lambda: some)
     [(structure, core)] = check.load(path)
-    return check.check(structure, core, path, **more)
+    return check.check(structure, core, path, **{"seconds": 600, **more})   # however busy the machine is
 
 
 @pytest.mark.parametrize("source, core", [(EXAMPLE, "pure"), (FAST, "fast")])

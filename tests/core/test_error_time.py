@@ -265,8 +265,8 @@ def test_stopping(monkeypatch):
         return progress
 
     with pytest.raises(Cancelled):
-        lab.error_time(room(), (16, 12), seconds=5, progress=after(0.05))
-    kept = lab.error_time(room(), (16, 12), seconds=8, progress=after(0.6))
+        whole(room(), (16, 12), 4, progress=after(0.05))                 # the reference takes it to 0.14
+    kept = whole(room(), (16, 12), 4, progress=after(0.6))               # all are counted at 0.51
     assert kept["stopped"] and kept["rows"] and all(r["times"] for r in kept["rows"])
 
 
@@ -333,7 +333,7 @@ def test_a_setting_without_end_is_given_up(monkeypatch):
         return real(scene, **options)
 
     scene = room()
-    assert not any("given up" in line for line in module.error_time(scene, size=(8, 6), seconds=2.0)["left_out"])
+    assert not any("given up" in line for line in whole(scene, (8, 6), 2)["left_out"])
 
     class Stopped:
         cancelled, figures = True, {}

@@ -27,10 +27,13 @@ def test_time_is_of_the_right_order():
         trace(soup(10), name, core, size=(4, 4))  # imports
         start = time.process_time()
         trace(scene, name, core, size=(side, side))
-        assert 0.05 < expected / (time.process_time() - start) < 20, (core, name, expected)
+        ratio = expected / (time.process_time() - start)
+        print(core, name, ratio)
+        assert 0.05 < ratio < 20, (core, name, expected)
 
 
-def test_it_grows_with_what_is_asked():
+def test_it_grows_with_what_is_asked(monkeypatch):
+    monkeypatch.setattr(lab, "machine_seconds", lambda: lab.MACHINE)    # not what others do on it meanwhile
     small, large = soup(100), soup(10_000)
     for row in techniques():
         for core in row.cores:
@@ -69,7 +72,9 @@ def test_what_traces_other_things_than_rays_is_of_the_right_order(name, core):
     trace(ground.lit(ground.triangles(5)), name, core, size=(4, 4))     # imports
     start = time.process_time()
     trace(scene, name, core, size=(32, 24))
-    assert 0.03 < estimate(scene, name, core, (32, 24)).seconds / (time.process_time() - start) < 30
+    ratio = estimate(scene, name, core, (32, 24)).seconds / (time.process_time() - start)
+    print(core, name, ratio)
+    assert 0.03 < ratio < 30
 
 
 def test_instances_are_stored_once():

