@@ -18,8 +18,10 @@ from blenders import find_blender, find_window
 
 ROOT = Path(__file__).resolve().parent.parent
 MAIN, LTS = ROOT / ".venv/bin/python", ROOT / ".venv-4.5/bin/python"
-PYTEST = ["-m", "pytest", "-q", "-rs"]
-LONGEST = 1500  # seconds for one part
+LONGEST = 3000  # seconds for one part: then pytest ends with what it has found
+HANGING = LONGEST + 600  # and then it is killed
+OPTIONS = ["-q", "-rfEs", f"--session-timeout={LONGEST}"]
+PYTEST = ["-m", "pytest", *OPTIONS]
 
 
 class LeftOut(Exception):
@@ -46,7 +48,7 @@ def blender():
     site = {} if "blender-chroot" in command[0] else {"TEST_SITE": os.environ.get("TEST_SITE") or _test_site(command)}
     script = ["-b", "--factory-startup", "--python-exit-code", "1", "--python", "tests/run_in_blender.py"]
     # The core's slow tests do not depend on who runs Python, and have run in the part "core".
-    return [*command, *script, "--", "-q", "-rs", "-m", "not slow", "tests/addon", "tests/core"], site
+    return [*command, *script, "--", *OPTIONS, "-m", "not slow", "tests/addon", "tests/core"], site
 
 
 def gui():
@@ -90,12 +92,12 @@ def _stop(*_):
 
 
 def run(name):
-    """Run one part; returns (verdict, figures, seconds)."""
+    """Run one part; returns (verdict, figures, seconds, what pytest says of each test that failed)."""
     start = time.monotonic()
     try:
         command, environment = PARTS[name]()
     except LeftOut as reason:
-        return "LEFT OUT", {"reason": str(reason)}, 0.0
+        return "LEFT OUT", {"reason": str(reason)}, 0.0, []
     command = [str(word) for word in command]
     print(f"#### {name}: {' '.join(command)}", flush=True)
     lines = []
@@ -107,7 +109,7 @@ def run(name):
             stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, start_new_session=True,
         )  # fmt: skip
         _running.append(process)
-        alarm = threading.Timer(LONGEST, os.killpg, (process.pid, signal.SIGKILL))
+        alarm = threading.Timer(HANGING, os.killpg, (process.pid, signal.SIGKILL))
         alarm.start()
         try:
             for line in process.stdout:
@@ -118,11 +120,12 @@ def run(name):
             alarm.cancel()
     figures = _figures(lines)
     seconds = time.monotonic() - start
-    if code == -signal.SIGKILL and seconds >= LONGEST:
-        return "TIMED OUT", figures, seconds
+    wrong = [line.rstrip() for line in lines if re.match(r"(FAILED|ERROR) tests/|!!.* session.*timeout", line)]
+    if code == -signal.SIGKILL and seconds >= HANGING:
+        return "TIMED OUT", figures, seconds, wrong
     # A Blender that crashes may still exit with 0: without pytest's closing line nothing has passed.
     passed = code == 0 and figures.get("passed", 0) > 0
-    return ("passed" if passed else f"FAILED (exit {code})"), figures, seconds
+    return ("passed" if passed else f"FAILED (exit {code})"), figures, seconds, wrong
 
 
 def _figures(lines):
@@ -145,11 +148,12 @@ def main(names):
         results = ({"core": first.result()} if first else {}) | results
     print("\n#### Summary")
     total = dict.fromkeys(("passed", "failed", "error", "skipped"), 0)
-    for name, (verdict, figures, seconds) in results.items():
+    for name, (verdict, figures, seconds, wrong) in results.items():
         if verdict == "LEFT OUT":
             print(f"{name:10} LEFT OUT: {figures['reason'].upper()}")
             continue
         print(f"{name:10} {verdict:18} {', '.join(f'{number} {word}' for word, number in figures.items()):32} {seconds:6.1f} s")
+        print(*(f"    {line}" for line in wrong), sep="\n", end="\n" * bool(wrong))
         for word, number in figures.items():
             total[word] += number
     bad = [name for name, (verdict, *_) in results.items() if verdict not in ("passed", "LEFT OUT")]
