@@ -9,10 +9,12 @@ NAME = "Rayscope"
 
 
 def image_of(width, height):
-    """The image that traces go into, in this size; made where there is none. It keeps high dynamic range."""
-    image = bpy.data.images.get(NAME)
-    if image is not None and (image.source != "GENERATED" or not image.is_float):
-        image = None  # somebody else's: Blender names ours Rayscope.001
+    """The image that traces go into, in this size; made where there is none. It keeps high dynamic range.
+
+    One of that name that is somebody else's, or was saved as a file, is left alone: Blender names ours Rayscope.001.
+    """
+    ours = (i for i in bpy.data.images if i.name.partition(".")[0] == NAME and i.source == "GENERATED" and i.is_float)
+    image = next(ours, None)
     if image is None:
         image = bpy.data.images.new(NAME, width, height, alpha=True, float_buffer=True)
         image.use_fake_user = False

@@ -62,8 +62,14 @@ def select(cells, levels=None, leaves_only=False, empty=True):
     return np.flatnonzero(keep)
 
 
+def colouring(cells, by):
+    """What the colours show: where all cells are of one level, as those of direction cubes are, their primitives instead."""
+    return "COUNT" if by == "LEVEL" and len(cells) and (cells.level == cells.level[0]).all() else by
+
+
 def values(cells, by):
     """The number that colours each cell, shape (c,): its level, its primitives, its share of the SAH cost, or its group."""
+    by = colouring(cells, by)
     if by == "GROUP":
         return np.full(len(cells), -1) if cells.group is None else cells.group
     return {"LEVEL": cells.level, "COUNT": cells.count, "COST": cells.cost}[by]
@@ -75,6 +81,7 @@ def scale(cells, by, leaves_only=False):
     Both are of all leaves, or of the whole structure, whatever levels are selected: so a colour keeps its meaning while
     levels are filtered. Counts and costs fall off by orders of magnitude below the root, so theirs is logarithmic.
     """
+    by = colouring(cells, by)
     value = values(cells, by)
     if leaves_only:
         value = value[cells.leaf]
@@ -87,6 +94,7 @@ def scale(cells, by, leaves_only=False):
 
 def place(cells, index, by, leaves_only=False):
     """Where in the colour map, 0..1, the cells chosen lie, shape (n,); cells without primitives, cost or group lie at 0."""
+    by = colouring(cells, by)
     if by == "GROUP":
         group = values(cells, by)[index]
         return np.where(group < 0, 0.0, 0.15 + 0.85 * (group * GOLDEN % 1.0)).astype(np.float32)
@@ -223,7 +231,8 @@ def described(cells, cell):
     name = f"Slab across {'xyz'[cells.group[cell]]}" if cells.volume == "slab" else f"Cell {cell}"
     if cells.code is not None:
         name += f", code {cells.code[cell]}"
-    line = f"{name}: level {cells.level[cell]}, {cells.count[cell]:,} primitives, cost {cells.cost[cell]:.3g}"
+    n = cells.count[cell]
+    line = f"{name}: level {cells.level[cell]}, {n:,} primitive{'s' * int(n != 1)}, cost {cells.cost[cell]:.3g}"
     others = len(alike(cells, cell)) - 1
     if cells.volume != "slab" and cells.group is not None and cells.group[cell] >= 0:
         line += f", list {cells.group[cell]} shared with {others:,} other cell{'s' * (others != 1)}"

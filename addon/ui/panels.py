@@ -76,6 +76,10 @@ def table(layout, share, *headings):
     return columns
 
 
+#: The colors of the overlay, in a word.
+MEANT = {"LEVEL": "Level", "COUNT": "Primitives", "COST": "Cost"}
+
+
 def draw_overlay(layout, scene):
     """What of the structure is drawn, and how."""
     overlay = scene.rayscope.overlay
@@ -88,10 +92,11 @@ def draw_overlay(layout, scene):
     layout.prop(overlay, "colour_by")
     built = session.built_of(scene)
     if built is not None and len(built.cells):
-        low, high = (f"{end:.3g}" if overlay.colour_by == "COST" else f"{end:,.0f}" for end in _ends(built, overlay.colour_by, overlay.leaves_only))
+        what, *ends = _ends(built, overlay.colour_by, overlay.leaves_only)
+        low, high = (f"{end:.3g}" if what == "COST" else f"{end:,.0f}" for end in ends)
         row = layout.row()
         row.alignment = "RIGHT"
-        row.label(text=f"{high} lists or axes" if overlay.colour_by == "GROUP" else f"Purple {low}, yellow {high}")
+        row.label(text=f"{high} lists or axes" if what == "GROUP" else f"{MEANT[what]}: purple {low}, yellow {high}")
         if built.cells.covered is not None:
             row = layout.row()
             row.alignment = "RIGHT"
@@ -101,11 +106,12 @@ def draw_overlay(layout, scene):
     layout.operator("rayscope.point", icon="EYEDROPPER")
 
 
-def _ends(built, *choice):
-    """The values of the colour map's ends, computed once for each structure and choice of what is coloured."""
+def _ends(built, by, leaves_only):
+    """What the colors show and the values of the color map's ends, computed once for each structure and choice."""
+    choice = by, leaves_only
     if choice not in built.ends:
-        from ..show.overlay_data import scale
-        built.ends[choice] = scale(built.cells, *choice)
+        from ..show.overlay_data import colouring, scale
+        built.ends[choice] = colouring(built.cells, by), *scale(built.cells, by, leaves_only)
     return built.ends[choice]
 
 

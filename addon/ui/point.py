@@ -75,7 +75,8 @@ def look(context, built, x, y):
 
 def told(beam):
     """A line about a beam."""
-    return f"Beam along {'-' if beam.sign < 0 else '+'}{'xyz'[beam.axis]}: level {beam.level}, {len(beam.items):,} candidates"
+    n = len(beam.items)
+    return f"Beam along {'-' if beam.sign < 0 else '+'}{'xyz'[beam.axis]}: level {beam.level}, {n:,} candidate{'s' * (n != 1)}"
 
 
 def _view_at(context, x, y):

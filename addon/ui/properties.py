@@ -192,7 +192,7 @@ class RAYSCOPE_PG_overlay(bpy.types.PropertyGroup):
         description="What the colors show",
         update=_redraw,
         items=(
-            ("LEVEL", "Level", "Levels below the root"),
+            ("LEVEL", "Level", "Levels below the root; where there is but one, primitives"),
             ("COUNT", "Primitives", "References to primitives in the cell or below it, on a logarithmic scale"),
             ("COST", "Cost", "Expected tests for a random ray that meets the root, on a logarithmic scale"),
             (

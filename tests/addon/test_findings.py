@@ -74,7 +74,7 @@ def plant_double(cube):
 
 #: What is wrong -> how it gets into the scene, the objects that are named, what the text says of the result, and of the remedy.
 PLANTED = {
-    "far from the origin": (plant_far, {"Cube"}, "its surface is uneven", "Move the scene to the origin"),
+    "far from the origin": (plant_far, {"Cube"}, "its surface is uneven", "Move it to the origin"),
     "range of scale": (plant_tiny, {"Cube", "Speck"}, "rays that start on the large one may miss", "Scale one of them"),
     "zero scale": (plant_flat, {"Cube"}, "0 along Y: it is flat or gone", "Clear > Scale"),
     "slivers": (lambda cube: triangles("Needle", [(0, 0, 3), (1, 1, 3), (1, 1 + 1e-5, 3)], [(0, 1, 2)]), {"Needle"}, "their normals", "Degenerate Dissolve"),

@@ -71,8 +71,24 @@ def test_build_fills_the_figures(scene):
     assert len(built.cells) > 1 and built.cells.count[0] == 12 and not built.stale
     scene.rayscope.technique = "grid"  # chosen, not built
     assert panels.built_text(built) == f"bvh, {len(built.cells)} cells"
-    assert panels._ends(built, "LEVEL") == (0.0, float(built.cells.level.max()))
+    assert panels._ends(built, "LEVEL", False) == ("LEVEL", 0.0, float(built.cells.level.max()))
     assert set(built.index.figures) <= set(FIGURES), "every figure of a build has a row in the table"
+
+
+def test_traces_go_into_one_image_and_leave_others_alone(scene, tmp_path):
+    scene.render.resolution_x, scene.render.resolution_y = 16, 12
+
+    def traced():
+        assert bpy.ops.rayscope.trace() == {"FINISHED"}
+        return sorted(image.name for image in bpy.data.images if image.name.startswith("Rayscope"))
+
+    assert traced() == traced() == ["Rayscope"]
+    kept = bpy.data.images["Rayscope"]
+    kept.filepath_raw, kept.file_format = str(tmp_path / "kept.png"), "PNG"
+    kept.save()
+    kept.source = "FILE"  # as Image > Save As leaves it
+    assert traced() == traced() == ["Rayscope", "Rayscope.001"], "one more image for each picture"
+    assert kept.source == "FILE" and bpy.data.images["Rayscope.001"].pixels[3] == 1.0
 
 
 def test_trace_adds_its_figures(scene):

@@ -27,9 +27,9 @@ def warnings(scene):
         far = float(np.abs([lo, hi]).max())
         if sizes[k] and far > 1e5 * sizes[k]:
             found.append(Finding([scene.objects[k].name], "far from the origin",
-                                 f"it measures {sizes[k]:.3g} at {far:.3g} from the origin: Blender stores its places to "
-                                 f"{far * 2.0**-24:.1g}, {far * 2.0**-24 / sizes[k]:.1%} of its size, so its surface is uneven before any ray is traced",
-                                 "Move the scene to the origin (parent all to an Empty, and move that).",
+                                 f"it measures {sizes[k]:.3g} at {far:.3g} from the origin: Blender rounds its places by up to "
+                                 f"{far * 2.0**-24:.1g}, which is {far * 2.0**-24 / sizes[k]:.1%} of its size; so its surface is uneven before any ray is traced",
+                                 "Move it to the origin; where all is far away, parent all to an Empty, and move that.",
                                  far / sizes[k]))
     solid = {k: s for k, s in sizes.items() if s > 0.0}
     if solid:
