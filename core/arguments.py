@@ -28,6 +28,32 @@ def whole(low, high):
     return parse
 
 
+def number(low, high):
+    """A type of option: a number from low to high."""
+    def parse(text):
+        try:
+            value = float(text)
+        except ValueError:
+            raise argparse.ArgumentTypeError(f"a number is needed, not {text!r}") from None
+        if not low <= value <= high:                                      # nor is NaN
+            raise argparse.ArgumentTypeError(f"{text} does not lie between {low:g} and {high:g}")
+        return value
+    return parse
+
+
+def add_parameters(parser, parameters):
+    """Add an option for each declared parameter: its name, range, default and help."""
+    for p in parameters:
+        option = "--" + p.name.replace("_", "-")
+        if p.type is bool:
+            parser.add_argument(option, action="store_true", help=p.help)
+        elif p.choices:
+            parser.add_argument(option, choices=p.choices, default=p.default, help=p.help)
+        else:
+            kind = whole if p.type is int else number
+            parser.add_argument(option, metavar="N", type=kind(p.low, p.high), default=p.default, help=p.help)
+
+
 #: A type of option: the seed of random numbers.
 seed = whole(0, 2**31 - 1)
 
@@ -82,13 +108,15 @@ def checked(choice, core):
     return name, {key: values[key] for key in given}
 
 
-def check_output(option, path):
-    """Fail before the work rather than after it when a file cannot be written."""
+def check_output(option, path, ending):
+    """Fail before the work rather than after it when a file cannot be written, or has another format's ending."""
     if path is None:
         return
     parent = Path(path).absolute().parent
     if Path(path).is_dir():
         raise ParameterError(f"{option} {path}: this is a folder; name a file.")
+    if not str(path).lower().endswith(ending):
+        raise ParameterError(f"{option} {path}: this file is written as {ending[1:].upper()}; give it a name that ends with {ending}.")
     if not parent.is_dir():
         raise ParameterError(f"{option} {path}: there is no folder {parent}; make it, or choose another.")
     if not os.access(path if Path(path).exists() else parent, os.W_OK):

@@ -92,7 +92,9 @@ def main(argv=None, read_scene=None, open_in_blender=None, read_frames=None):
         The exit code.
     """
     try:
-        call = parser(with_file=read_scene is None).parse_args(sys.argv[1:] if argv is None else list(argv))
+        call, left = parser(with_file=read_scene is None).parse_known_args(sys.argv[1:] if argv is None else list(argv))
+        if left:
+            raise ParameterError(f"{left[0]} means nothing here. See: rayscope {call.verb} --help")
     except SystemExit as stop:                                            # --help has printed
         return stop.code or DONE
     except ParameterError as error:
@@ -155,6 +157,8 @@ class Parser(argparse.ArgumentParser):
         return super().parse_known_args(args, namespace)
 
     def error(self, message):
+        if message.endswith("expected one argument"):
+            message += "; one that begins with - is written --option=-1"
         raise ParameterError(f"{message}. See: {self.prog} --help")
 
 

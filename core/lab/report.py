@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ..errors import MissingPackageError
+from ..errors import MissingPackageError, ParameterError
 
 
 def version():
@@ -125,9 +125,22 @@ def to_csv(rows, columns):
 
 
 def folder(path):
-    """Make a folder that results go to; returns its Path."""
+    """Make a folder that results go to; returns its Path.
+
+    Raises
+    ------
+    ParameterError
+        When it cannot be made, is a file, or nothing may be written into it.
+    """
     path = Path(path)
-    path.mkdir(parents=True, exist_ok=True)
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+    except FileExistsError:
+        raise ParameterError(f"--out {path}: this is a file; name a folder.") from None
+    except OSError as error:
+        raise ParameterError(f"--out {path}: the folder cannot be made ({error.strerror}); choose another place.") from None
+    if not os.access(path, os.W_OK):
+        raise ParameterError(f"--out {path}: nothing may be written into this folder; choose another.")
     return path
 
 

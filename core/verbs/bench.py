@@ -40,6 +40,12 @@ def options(sub):
 
 
 def run(call):
+    if call.out and not call.directional:
+        raise ParameterError("--out goes with --directional alone.")
+    if call.only and not (call.automatic or call.adaptive):
+        raise ParameterError("--only goes with --automatic or --adaptive.")
+    if call.out:
+        report.folder(call.out)
     if call.generalised is not None:
         return _generalised(call)
     if call.adaptive:

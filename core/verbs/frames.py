@@ -26,23 +26,23 @@ def options(sub):
 
 def run(call):
     parameters = checked((frames.TECHNIQUE, dict(call.set)), call.core)[1]
+    out = report.folder(call.out) if call.out else None
     scene = call.scene(call.size)
     if call.read_frames is None or str(getattr(call, "file", ".blend")).lower().endswith(OWN):
-        raise ParameterError("frames: an animation is needed, and only a .blend file holds one.")
+        raise ParameterError(f"{getattr(call, 'file', scene.name)}: an animation is needed, and only a .blend file holds one.")
     size = call.size or proportional(scene.camera)
     with stoppable() as progress:
         numbers, scenes = call.read_frames(*call.frames, size, progress)
         index, result = frames.frames(scenes, numbers, call.core, call.rays, call.seed, parameters, say)
         text = [frames.text(result)]
-        if call.out:
-            out = report.folder(call.out)
+        if out:
             for k, (number, one) in enumerate(zip(numbers, scenes)):
                 path = out / f"frame_{number:04d}.png"
                 save_png(path, trace(one, core=call.core, size=size, index=index.at(k), progress=progress).image)
                 text.append(f"picture: {path}")
     asked = {"frames": numbers, "parameters": parameters, "core": call.core, "rays": call.rays, "size": size}
     record = report.record("frames", scene, call.seed, asked, meanings=frames.MEANINGS, **result)
-    if call.out:
+    if out:
         text.append(f"written: {report.save(record, out)}")
     for notice in index.notices:
         say(str(notice))

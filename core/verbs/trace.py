@@ -2,12 +2,12 @@
 
 from pathlib import Path
 
-from ..arguments import DEFAULT_SIDE, assignment, check_output, checked, picture_size, proportional, specification
+from ..arguments import DEFAULT_SIDE, add_parameters, assignment, check_output, checked, picture_size, proportional, specification
 from ..catalogue import CORES
 from ..image_file import save_png
 from ..lab import report
 from ..lab.estimate import estimate
-from ..options import AUTOMATIC
+from ..options import AUTOMATIC, PARAMETERS
 from ..outcome import DONE, FAILED, Outcome, say, stoppable
 from ..rendering import trace
 
@@ -17,8 +17,8 @@ LONG_SECONDS = 10.0
 #: Kinds of rays that may have a technique of their own.
 KINDS = {"primary": "camera rays", "secondary": "reflected, refracted and transparent rays", "shadow": "shadow rays"}
 
-#: Options of :func:`rayscope.core.trace` that go to it as they are.
-FEWER = ("threshold", "roulette", "sampling", "antialiasing", "aa_threshold", "aa_level", "light_samples")
+#: Options of :func:`rayscope.core.trace` that an estimate takes by the same names.
+FEWER = tuple(p.name for p in PARAMETERS if p.name not in ("depth", "samples", "seed"))
 
 #: Columns of the table that only a run with --count fills.
 COUNTS = ("N_IT", "N_TS", "N_ETS", "N_EETS", "r_ITM")
@@ -34,22 +34,7 @@ def options(sub):
     sub.add_argument("--core", choices=CORES, default="fast")
     sub.add_argument("--size", metavar="WxH", type=picture_size,
                      help=f"pixels; without it {DEFAULT_SIDE} on the longer side")
-    sub.add_argument("--depth", type=int, default=5, help="reflections and refractions in a row, at most")
-    sub.add_argument("--samples", type=int, default=1, help="samples a pixel")
-    sub.add_argument("--seed", type=int, default=0)
-    sub.add_argument("--threshold", type=float, default=0.0, help="rays with less weight in their pixel are not traced")
-    sub.add_argument("--roulette", action="store_true",
-                     help="trace some of the rays below the threshold, by chance, for the others")
-    sub.add_argument("--sampling", choices=("stratified", "random"), default="stratified",
-                     help="points of the pixel and of lights, over the samples of a pixel: spread evenly, "
-                     "or each at random by itself")
-    sub.add_argument("--antialiasing", choices=("uniform", "corners", "variance"), default="uniform",
-                     help="equally many samples in all pixels, or more where corners differ "
-                     "or where the variance is high")
-    sub.add_argument("--aa-threshold", type=float, default=0.025,
-                     help="difference in displayed values, 0 to 1, that is put up with")
-    sub.add_argument("--light-samples", type=int, default=1, help="shadow rays to each light that has an extent")
-    sub.add_argument("--aa-level", type=int, default=3, help="adaptive antialiasing: 4^level samples a pixel, at most")
+    add_parameters(sub, PARAMETERS)
     sub.add_argument("--count", action="store_true", help="count tests and steps (slower)")
     sub.add_argument("--image", metavar="OUT.png", help="write the picture")
     sub.add_argument("--figures", metavar="OUT.json", help="write what it cost")
@@ -58,13 +43,15 @@ def options(sub):
 def run(call):
     name, parameters = checked((call.technique[0], {**call.technique[1], **dict(call.set)}), call.core)
     others = {kind: checked(choice, call.core) for kind in KINDS if (choice := getattr(call, kind))}
-    check_output("--image", call.image)
-    check_output("--figures", call.figures)
+    check_output("--image", call.image, ".png")
+    check_output("--figures", call.figures, ".json")
     fewer = {option: getattr(call, option) for option in FEWER}
     scene = call.scene(call.size)
     size = call.size or proportional(scene.camera)
     expected = estimate(scene, "bvh" if name == AUTOMATIC else name, call.core, size,
-                        max(call.samples, 1), max(call.depth, 0), **fewer).check_memory()
+                        call.samples, call.depth, **fewer).check_memory()
+    if not scene.n_primitives:
+        say(f"{scene.name}: there is nothing in it to trace; the picture shows its background.")
     if expected.seconds > LONG_SECONDS:
         say(expected.lines()[0])
     with stoppable() as progress:
