@@ -178,17 +178,6 @@ def test_cells_of_one_level_are_coloured_by_their_primitives():
     assert overlay_data.colouring(cells, "LEVEL") == "LEVEL" and overlay_data.scale(cells, "LEVEL") == (0.0, 1.0)
 
 
-def test_cells_of_one_level_are_coloured_by_their_primitives():
-    """Those of direction cubes and of grids without a root: levels would give all of them one colour."""
-    square = np.array([(0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (1.0, 1.0, 0.0)])
-    cells = Cells.quads([square, square + 1.0, square + 2.0], [0, 0, 0], [1, 10, 100], [True] * 3, [-1] * 3, [False] * 3)
-    everything = np.arange(3)
-    assert overlay_data.colouring(cells, "LEVEL") == "COUNT" and overlay_data.scale(cells, "LEVEL") == (1.0, 100.0)
-    np.testing.assert_allclose(overlay_data.place(cells, everything, "LEVEL"), [0.0, 0.5, 1.0], atol=1e-6)
-    cells.level[2] = 1
-    assert overlay_data.colouring(cells, "LEVEL") == "LEVEL" and overlay_data.scale(cells, "LEVEL") == (0.0, 1.0)
-
-
 def test_flat_cells_are_drawn_as_they_lie_and_full_occluders_stand_out():
     """Two quads side by side that no axis is along, seen from -z; the second has a full occluder."""
     first = np.array([(-0.6, -0.3, 0.1), (-0.4, 0.3, 0.2), (-0.1, -0.4, 0.3), (0.1, 0.2, 0.4)])
