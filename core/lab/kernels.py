@@ -157,7 +157,7 @@ def _triangles(corners):
     return Triangles(xyz, np.zeros(n, np.int32), np.arange(n), np.zeros(n, bool))
 
 
-def timings(repeats=5, seed=0, fast_pairs=FAST_PAIRS, pure_pairs=PURE_PAIRS):
+def timings(repeats, seed):
     """Nanoseconds a test; every ray has a triangle and a box of its own, and meets about half of them.
 
     Returns
@@ -166,7 +166,7 @@ def timings(repeats=5, seed=0, fast_pairs=FAST_PAIRS, pure_pairs=PURE_PAIRS):
         test -> {"ns_fast", "ns_pure", "hits"}, the last the part of the tests that hit.
     """
     rng = np.random.default_rng(seed)
-    n = fast_pairs
+    n = FAST_PAIRS
     corners = rng.normal(size=(n, 3, 3))
     u, v = rng.random((2, n, 1))                        # of the parallelogram: half is the triangle
     target = corners[:, 0] + u * (corners[:, 1] - corners[:, 0]) + v * (corners[:, 2] - corners[:, 0])
@@ -184,7 +184,7 @@ def timings(repeats=5, seed=0, fast_pairs=FAST_PAIRS, pure_pairs=PURE_PAIRS):
     fast |= {name: lambda test=test: int(test(rays, pairs, *columns, far)[2].sum())
              for name, test in fast_boxes.TESTS.items()}
 
-    m = min(pure_pairs, n)
+    m = PURE_PAIRS
     single = [Ray(o, d) for o, d in zip(origins[:m].tolist(), directions[:m].tolist())]
     triangles = [Triangle(*map(tuple, c)) for c in corners[:m].tolist()]
     boxes = list(zip(lo[:m].tolist(), hi[:m].tolist()))
@@ -215,11 +215,11 @@ def timings(repeats=5, seed=0, fast_pairs=FAST_PAIRS, pure_pairs=PURE_PAIRS):
 
 # --- wrong answers: triangles -----------------------------------------------------------------------------------------
 
-def closed_mesh(seed=0, subdivisions=2):
+def closed_mesh(seed=0):
     """A ball of triangles, turned at random, at CENTRE: vertices (V, 3) and triangles (T, 3)."""
     vertices = [(1, 0, 0), (0, 1, 0), (0, 0, 1), (-1, 0, 0), (0, -1, 0), (0, 0, -1)]
     faces = [(x, y, z) if (x + y + z) % 2 else (y, x, z) for x in (0, 3) for y in (1, 4) for z in (2, 5)]
-    for _ in range(subdivisions):
+    for _ in range(2):
         middle, finer = {}, []
         for a, b, c in faces:
             for edge in ((a, b), (b, c), (c, a)):

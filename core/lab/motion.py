@@ -149,13 +149,13 @@ def _tests(index, rays):
     return float(rays.ask(index, count=True).n_it.mean())
 
 
-def _test_cost(volumes, rays, repeats=7):
+def _test_cost(volumes, rays):
     """Nanoseconds of one test of a volume, the least of several measurements."""
     some, _ = Rays.checked(rays.origins, rays.directions, 0.0, np.inf)
     values = volumes.of_rays(some)
     ray, which = np.arange(PAIRS) % some.n, np.arange(PAIRS) % len(volumes)
     best = math.inf
-    for _ in range(repeats):
+    for _ in range(7):
         start = time.perf_counter()
         volumes.enter(values, ray, which, some.t_max[ray])
         best = min(best, time.perf_counter() - start)
