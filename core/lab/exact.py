@@ -1,4 +1,4 @@
-"""Exact truth: rays against shapes, and the cells they run through, without any rounding.
+"""Exact truth: rays against shapes and boxes, without any rounding.
 
 Every number that comes in is taken for exactly what the float is, and worked on as a :class:`~fractions.Fraction`.
 Slow (tens of microseconds a test), and independent of both cores: this is what they are held against. t is in
