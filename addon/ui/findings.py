@@ -74,9 +74,9 @@ class RAYSCOPE_OT_select(bpy.types.Operator):
         return {"FINISHED"}
 
 
-def draw_select(layout, names, text, icon="NONE"):
+def draw_select(layout, names, text):
     """A button that selects objects."""
-    layout.operator("rayscope.select", text=text, icon=icon).names = "\n".join(names)
+    layout.operator("rayscope.select", text=text).names = "\n".join(names)
 
 
 def draw_finding(layout, finding, width):

@@ -66,7 +66,6 @@ class Work:
         self._shown, self._last, self._pause = 0.0, 0.0, REFRESH
         manager = context.window_manager
         self._timer = manager.event_timer_add(TICK, window=context.window)
-        self._window = context.window
         manager.progress_begin(0.0, 1.0)
         context.workspace.status_text_set(f"{self.title}: Esc stops it")
         manager.modal_handler_add(self)
