@@ -124,3 +124,16 @@ def test_an_empty_scene_shows_the_surroundings(core):
 def test_soft_light_is_sampled_where_asked(core):
     hard, soft = (trace(with_area("rectangle"), "pyramids", core, (8, 6), light_samples=n) for n in (1, 4))
     assert hard.figures["shadow"]["rays"] < soft.figures["shadow"]["rays"]
+
+
+@pytest.mark.parametrize("core", ["pure", "fast"])
+@pytest.mark.parametrize("name", ["pyramids", "cones"])
+def test_a_camera_within_the_plane_of_a_triangle_does_not_see_it(core, name):
+    """Found at random: the volume between it and the eye was 0, and what rounding left of its outline covered parts of pixels."""
+    s = 1.3031976371573821e-07
+    corners = [(-s, 0.0, -s), (s, 0.0, -s), (-s, 0.0, 0.5 * s)]
+    matrix = np.array([(0.0, 0.0, -1.0, -8.687984247715881e-08), (-1.0, 0.0, 0.0, 0.0), (0.0, 1.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0)])
+    glow = Material("glow", ambient=0.0, diffuse=0.0, emission=(9.0, 9.0, 9.0))
+    scene = Scene([Object("floor", Mesh(corners, [(0, 1, 2), (0, 2, 1)]), materials=(glow,))], camera=Camera(matrix, (-0.1, 1.1, -0.6, 0.6)),
+                  world=World((0.25, 0.25, 0.25)))
+    assert (trace(scene, name, core, (1, 5)).image[..., :3] == 0.25).all()

@@ -5,6 +5,9 @@ import numpy as np
 from ..tracing.vectors import dot
 from .half_planes import covered
 
+#: What rounding leaves of the volume between the apex and a triangle whose plane goes through it, by products of its extents: at most.
+VOLUME = 2.0**-49
+
 
 def measured(cones, cone, corners, row):
     """Columns of the triangles that cover anything, whose corners are given: three arrays of shape (3, m)."""
@@ -57,7 +60,7 @@ def measured(cones, cone, corners, row):
             rate = -sign * np.where(parallel[some], 1.0, bound) * side[some]
             line[:, some] = rate * nx[some], rate * ny[some], sign * side[some] * (total[some] - bound * nw[some])
             lines.append(line)
-    present = np.ones(len(kept), bool)
+    present = ~_edge_on(at, (ax, ay, aw), (bx, by, bw), np.where(parallel, nw, total), parallel)
     bound = np.flatnonzero(cones.away.any(axis=0)[cone]) if len(kept) else kept
     if len(bound):
         # Heights above the plane left are interpolated between corners as everything else is.
@@ -82,6 +85,24 @@ def measured(cones, cone, corners, row):
         "row": row[kept[some]], "share": share[some], "s": s[some], "t": t[some], "lines": lines[:, :, some],
         "plane": np.stack([nx, ny, nw, total])[:, some],
     }
+
+
+def _edge_on(at, a, b, seen, parallel):
+    """Which triangles are seen edge-on, all but for rounding: the lines around them may then enclose anything.
+
+    Parameters
+    ----------
+    at : list of 3 points
+        Their corners.
+    a, b : triples
+        The second and the third corner, seen from the first.
+    seen : ndarray
+        Six times the volume between each and the apex; in parallel cones, twice the area of its outline.
+    parallel : ndarray of bool
+    """
+    x, y, w = (np.maximum(np.maximum(np.abs(p), np.abs(q)), np.abs(r)) for p, q, r in zip(*at))
+    dx, dy, dw = (np.maximum(np.abs(p), np.abs(q)) for p, q in zip(a, b))
+    return ~(np.abs(seen) > VOLUME * np.where(parallel, x * dy + y * dx, x * y * dw + x * w * dy + y * w * dx))
 
 
 def joined(parts):

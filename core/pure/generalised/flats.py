@@ -6,6 +6,25 @@ from ...vectors import cross, dot, minus
 from .half_planes import covered
 from .outlines import Outline
 
+#: What rounding leaves of the volume between the apex and a triangle whose plane goes through it, by products of its extents: at most.
+VOLUME = 2.0**-49
+
+
+def edge_on(p, seen, parallel):
+    """Whether a triangle is seen edge-on, all but for rounding: the lines around it may then enclose anything.
+
+    Parameters
+    ----------
+    p : list of triples
+        Its corners.
+    seen : float
+        Six times the volume between it and the apex; in parallel cones, twice the area of its outline.
+    parallel : bool
+    """
+    x, y, w = (max(map(abs, column)) for column in zip(*p))
+    dx, dy, dw = (max(abs(q - column[0]) for q in column[1:]) for column in zip(*p))
+    return not abs(seen) > VOLUME * (x * dy + y * dx if parallel else x * y * dw + x * w * dy + y * w * dx)
+
 
 class Flat(Outline):
     """A triangle.
@@ -34,7 +53,7 @@ class Flat(Outline):
                 lines.append((rate * n[0], rate * n[1], sign * (total - limit * n[2])))
             else:
                 lines.append((0.0, 0.0, 0.0))
-        there = turn < 0.0 or turn > 0.0
+        there = (turn < 0.0 or turn > 0.0) and not edge_on(p, n[2] if cone.parallel else total, cone.parallel)
         if cone.away:
             # Heights above the plane left are interpolated between corners as everything else is.
             heights = [cone.height(c) for c in corners]
