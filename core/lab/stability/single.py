@@ -48,7 +48,7 @@ def single_precision(chosen, seed):
                 continue
             got, length = asked(batch, index), lengths(batch.d)
             both = (right.primitive >= 0) & (got.primitive >= 0)
-            off, t = np.abs(got.t - right.t)[both] * length[both], right.t[both] * length[both]
+            off, t = np.abs(got.t[both] - right.t[both]) * length[both], right.t[both] * length[both]
             new = {"case": case.name, "technique": row.name, "core": "fast", "rays": len(batch),
                    "lost": int(((right.primitive >= 0) & (got.primitive < 0)).sum()),
                    "t_error": float((off / (EPSILON * np.maximum(t, size_of(scene)))).max(initial=0.0)),
