@@ -39,7 +39,7 @@ import numpy as np
 
 from ..catalogue import Technique, build
 from ..errors import ParameterError, RayscopeError
-from ..parameters import resolve
+from ..parameters import Parameter, resolve
 from . import report
 from .rays import ray_sets
 from .stability import cases
@@ -52,6 +52,11 @@ from .stability.trial import asked, scene_and_rays, size_of
 RAYS, SECONDS = 40, 20.0
 #: Triangles and rays of the scene on which the work is counted.
 WORK, WORK_RAYS = 400, 200
+#: What a structure of each core must have.
+METHODS = {
+    "pure": {"build": "build(self, progress)", "walk": "walk(self, query)"},
+    "fast": {"build": "build(self, progress)", "traverse": "traverse(self, rays, query)"},
+}
 COLUMNS = ("case", "rays", "wrong", "lost", "ghost", "shadow", "verdict")
 
 
@@ -75,7 +80,8 @@ def load(path):
     """
     path = Path(path)
     if not path.is_file():
-        raise ParameterError(f"{path}: there is no such file. check takes a Python file with a structure in it.")
+        what = "this is a folder" if path.is_dir() else "there is no such file"
+        raise ParameterError(f"{path}: {what}. check takes a Python file with a structure in it.")
     spec = importlib.util.spec_from_loader("handed_in", importlib.machinery.SourceFileLoader("handed_in", str(path)))
     module = importlib.util.module_from_spec(spec)
     # Found by name while the file is run, as dataclasses do; no trace of it is left.
@@ -83,7 +89,7 @@ def load(path):
     before, sys.dont_write_bytecode = sys.dont_write_bytecode, True
     try:
         spec.loader.exec_module(module)
-    except Exception as error:
+    except (Exception, SystemExit) as error:
         raise ParameterError(f"{path.name} cannot be run: {_where(error, path)}.") from None
     finally:
         sys.dont_write_bytecode = before
@@ -122,8 +128,16 @@ def check(structure, core, path, scene=None, seed=0, seconds=SECONDS, say=lambda
         name, core. rows : list of dict, one a case: case, rays; wrong, lost, ghost : hits that are not the nearest, are
         missing, are none; shadow : rays wrongly said to be blocked or free; verdict. first : the first ray that failed, in
         words. work : N_IT, N_TS, T_B, T_R beside brute force's, on a scene of many triangles. failed : bool.
+
+    Raises
+    ------
+    ParameterError
+        When its PARAMETERS are none.
     """
-    row = Technique(structure.__name__, structure.__name__, "handed in", "", "", "", "", parameters=tuple(getattr(structure, "PARAMETERS", ())))
+    parameters = getattr(structure, "PARAMETERS", ())
+    if not isinstance(parameters, (tuple, list)) or not all(isinstance(p, Parameter) for p in parameters):
+        raise ParameterError(f"{structure.__name__}.PARAMETERS is a tuple of rayscope.core.parameters.Parameter, not {parameters!r}.")
+    row = Technique(structure.__name__, structure.__name__, "handed in", "", "", "", "", parameters=tuple(parameters))
     values = resolve(row.name, row.parameters, {}, core)
 
     def made(scene):
@@ -142,8 +156,8 @@ def check(structure, core, path, scene=None, seed=0, seconds=SECONDS, say=lambda
             verdict, first = "stopped", f"it had not ended after {seconds:g} s: does the walk always get nearer to its end?"
         except RayscopeError as error:
             verdict, first = "refused", str(error)
-        except Exception as error:
-            verdict, first = "error", _where(error, path)
+        except (Exception, SystemExit) as error:                        # sys.exit() would pass for a success
+            verdict, first = "error", _where(error, path, core)
         result["rows"].append({**found, "verdict": verdict})
         if first and not result["first"]:
             result["first"] = f"{name}: {first}"
@@ -250,13 +264,18 @@ class _Deadline:
             raise _TooLong from None
 
 
-def _where(error, path):
-    """An error and the line of the file that led to it."""
+def _where(error, path, core=None):
+    """An error and the line of the file that led to it; where there is none, what a structure of a core should look like."""
     if isinstance(error, SyntaxError) and error.filename == str(path):
         return f"line {error.lineno}: {error.msg}"
-    lines = [f for f in traceback.extract_tb(error.__traceback__) if f.filename == str(path)]
-    place = f"line {lines[-1].lineno}, in {lines[-1].name}: " if lines else ""
-    return f"{place}{type(error).__name__}: {error}"
+    frames = traceback.extract_tb(error.__traceback__)
+    if core and isinstance(error, NotImplementedError) and frames[-1].name in METHODS[core]:
+        return f"it has no method {METHODS[core][frames[-1].name]}"
+    lines = [f for f in frames if f.filename == str(path)]
+    told = f"{type(error).__name__}: {error}"
+    if lines:
+        return f"line {lines[-1].lineno}, in {lines[-1].name}: {told}"
+    return f"{told} (compare its methods with {' and '.join(METHODS[core].values())})" if core else told
 
 
 def text(results):

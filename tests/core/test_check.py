@@ -1,5 +1,6 @@
 """Structures that are handed in: right ones pass, wrong ones are told where they are wrong."""
 
+import json
 import textwrap
 
 import pytest
@@ -70,13 +71,41 @@ def test_an_error_names_the_line(tmp_path, monkeypatch):
     assert {row["verdict"] for row in result["rows"]} == {"error"} and f"line {line}, in walk: ZeroDivisionError" in result["first"]
 
 
+NONE = """
+from rayscope.core.{core}.structure import Structure
+
+class Mine(Structure):
+    {body}
+"""
+
+
+@pytest.mark.parametrize("core, body, words", [
+    ("pure", "def walk(self, query): pass", "it has no method build(self, progress)"),
+    ("pure", "def build(self, progress): pass", "it has no method walk(self, query)"),
+    ("fast", "def build(self, progress): pass", "it has no method traverse(self, rays, query)"),
+    ("pure", "def build(self): pass", "compare its methods with build(self, progress) and walk(self, query)"),
+    ("fast", "build = lambda self, progress: None; traverse = lambda self, query: None", "traverse(self, rays, query)"),
+    # What ends the program must not pass for a success.
+    ("pure", "build = lambda self, progress: None; walk = lambda self, query: exit(0)", "SystemExit"),
+])
+def test_methods_that_are_missing_or_other_than_they_should_be(tmp_path, monkeypatch, core, body, words):
+    result = run(tmp_path, NONE.format(core=core, body=body), monkeypatch)
+    assert result["failed"] and words in result["first"]
+
+
+def test_parameters_that_are_none(tmp_path, monkeypatch):
+    with pytest.raises(ParameterError, match="Mine.PARAMETERS is a tuple"):
+        run(tmp_path, NONE.format(core="pure", body="PARAMETERS = 3"), monkeypatch)
+
+
 def test_a_walk_without_end_is_stopped(tmp_path, monkeypatch):
     source = EXAMPLE.replace("        for half in self.halves:", "        while True:\n            pass\n        for half in self.halves:")
     result = run(tmp_path, source, monkeypatch, seconds=0.5)
     assert [row["verdict"] for row in result["rows"]] == ["stopped"] and "had not ended after 0.5 s" in result["first"]
 
 
-@pytest.mark.parametrize("source, words", [("import", "line 1"), ("x = 1", "no class"), ("raise KeyError('a')", "line 1, in <module>: KeyError"), (None, "no such file")])
+@pytest.mark.parametrize("source, words", [("import", "line 1"), ("x = 1", "no class"), ("raise KeyError('a')", "line 1, in <module>: KeyError"),
+                                           ("raise SystemExit(0)", "line 1, in <module>: SystemExit"), (None, "no such file")])
 def test_files_without_a_structure(tmp_path, source, words):
     path = tmp_path / "mine.py"
     if source is not None:
@@ -89,10 +118,11 @@ def test_files_without_a_structure(tmp_path, source, words):
 
 def test_the_verb(tmp_path, capsys, monkeypatch):
     (tmp_path / "mine.py").write_text(EXAMPLE)
-    (tmp_path / "other.py").write_text(WRONG["lost"][0])
+    (tmp_path / "other.py").write_text("print('hello')\n" + WRONG["lost"][0])
     some = check.cases.cases()[:1]
     monkeypatch.setattr(check.cases, "cases", lambda: some)
     assert main(["check", str(tmp_path / "mine.py")]) == 0
     assert "2 of 2 cases as brute force" in capsys.readouterr().out
     assert main(["check", str(tmp_path / "other.py"), "--json"]) == 1
-    assert '"failed": true' in capsys.readouterr().out
+    out, err = capsys.readouterr()
+    assert json.loads(out)["failed"] is True and "hello" in err, "what it prints is no part of the result"
