@@ -291,6 +291,14 @@ def techniques():
 def technique(name):
     """The row of one technique.
 
+    Parameters
+    ----------
+    name : str
+
+    Returns
+    -------
+    Technique
+
     Raises
     ------
     ParameterError

@@ -125,7 +125,21 @@ class Cells:
 
     @classmethod
     def make(cls, lo, hi, level, count, leaf, parent, volume="box", shape=None, area=None):
-        """Cells from their boxes, or from other volumes with their surface areas; the cost is computed here."""
+        """Cells from their boxes, or from other volumes; the cost is computed here.
+
+        Parameters
+        ----------
+        lo, hi, level, count, leaf, parent : array_like
+            As the attributes.
+        volume, shape : optional
+            As the attributes, where they are other than boxes.
+        area : array_like, shape (c,), optional
+            Surface areas of other volumes.
+
+        Returns
+        -------
+        Cells
+        """
         lo, hi = np.asarray(lo, float).reshape(-1, 3), np.asarray(hi, float).reshape(-1, 3)
         count, leaf = np.asarray(count, np.int32), np.asarray(leaf, bool)
         area = box_area(lo, hi) if area is None else np.asarray(area, float)
@@ -136,7 +150,19 @@ class Cells:
 
     @classmethod
     def quads(cls, corners, level, count, leaf, parent, covered):
-        """Flat cells from their corners, shape (c, 4, 3): (low, low), (low, high), (high, low), (high, high)."""
+        """Flat cells.
+
+        Parameters
+        ----------
+        corners : array_like, shape (c, 4, 3)
+            (low, low), (low, high), (high, low), (high, high).
+        level, count, leaf, parent, covered : array_like
+            As the attributes.
+
+        Returns
+        -------
+        Cells
+        """
         corners = np.asarray(corners, float).reshape(-1, 4, 3)
         sides = corners[:, 2] - corners[:, 0], corners[:, 1] - corners[:, 0]
         cells = cls.make(corners.min(axis=1), corners.max(axis=1), level, count, leaf, parent, "quad", corners.reshape(-1, 12),

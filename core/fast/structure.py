@@ -71,11 +71,27 @@ class Structure:
         return index
 
     def build(self, progress, **parameters):
-        """Build over ``self.primitives`` and fill in ``self.figures``."""
+        """Build over ``self.primitives`` and fill in ``self.figures``.
+
+        Parameters
+        ----------
+        progress : callable
+            Called with the fraction done, now and then; may raise Cancelled.
+        **parameters
+            Those that the technique declares.
+        """
         raise NotImplementedError
 
     def traverse(self, rays, query):
-        """Hand every (ray, primitive) pair that can matter to ``query.test``."""
+        """Hand every (ray, primitive) pair that can matter to ``query.test``.
+
+        Parameters
+        ----------
+        rays : Rays
+            The batch, ``rays.n`` of them: ``rays.o`` and ``rays.d`` by columns.
+        query : Closest or Occluded
+            ``query.t`` is the nearest hit of each ray so far; ``query.test(ray, item)`` tests pairs, two arrays of numbers.
+        """
         raise NotImplementedError
 
     def divide(self, rays):

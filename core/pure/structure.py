@@ -81,11 +81,26 @@ class Structure:
         return index
 
     def build(self, progress, **parameters):
-        """Build over ``self.primitives`` and fill in ``self.figures``."""
+        """Build over ``self.primitives`` and fill in ``self.figures``.
+
+        Parameters
+        ----------
+        progress : callable
+            Called with the fraction done, now and then; may raise Cancelled.
+        **parameters
+            Those that the technique declares.
+        """
         raise NotImplementedError
 
     def walk(self, query):
-        """Hand every primitive that can matter to ``query.test``, along ``query.ray`` as far as ``query.t``."""
+        """Hand every primitive that can matter to ``query.test``, along ``query.ray`` as far as ``query.t``.
+
+        Parameters
+        ----------
+        query : Closest or Occluded
+            ``query.ray`` is the ray, ``query.t`` the nearest hit so far, ``query.test(item)`` tests a primitive by its number
+            in ``self.primitives``, ``query.watch`` is told every step where it is not None.
+        """
         raise NotImplementedError
 
     def for_light(self, light):

@@ -40,7 +40,30 @@ class Camera:
 
     @classmethod
     def look_at(cls, position, target, up=(0.0, 0.0, 1.0), angle=math.radians(45.0), aspect=1.0, **more):
-        """A perspective camera at `position` that looks at `target`; `angle` is the full vertical field of view."""
+        """A perspective camera at one place that looks at another.
+
+        Parameters
+        ----------
+        position, target : sequence of 3 float
+            World space.
+        up : sequence of 3 float
+            What is up in the picture.
+        angle : float
+            Full vertical field of view, radians.
+        aspect : float
+            Width of the picture over its height.
+        **more
+            Other fields of the camera.
+
+        Returns
+        -------
+        Camera
+
+        Raises
+        ------
+        SceneError
+            When it stands where it looks, or looks along `up`.
+        """
         position = np.asarray(position, float)
         z = position - np.asarray(target, float)
         x = np.cross(np.asarray(up, float), z)

@@ -116,7 +116,26 @@ class Material:
     def principled(cls, name, base=(0.8, 0.8, 0.8), metallic=0.0, roughness=0.5, ior=1.5, alpha=1.0,
                    transmission=0.0, specular_level=0.5, emission=(0.0, 0.0, 0.0),
                    transmission_exponent=0.5, **more):
-        """The material for a Principled BSDF; see the table at the top of this file."""
+        """The material for a Principled BSDF; see the table at the top of this file.
+
+        Parameters
+        ----------
+        name : str
+        base, emission : sequence of 3 float
+            Linear colours.
+        metallic, roughness, alpha, transmission, specular_level : float
+            0 to 1, as in Blender.
+        ior : float
+            Index of refraction.
+        transmission_exponent : float
+            The power of `base` that tints what passes once through the surface.
+        **more
+            Other fields of the material.
+
+        Returns
+        -------
+        Material
+        """
         dielectric = 1.0 - metallic
         reflectance = min(1.0, 2.0 * specular_level * ((ior - 1.0) / (ior + 1.0)) ** 2)
         gloss = max(0.0, 1.0 - 2.0 * roughness)

@@ -206,7 +206,23 @@ class Scene:
 
     @classmethod
     def from_nff(cls, path):
-        """Read a Neutral File Format scene (``.nff``, ``.nff.gz``)."""
+        """Read a Neutral File Format scene (Haines 1987).
+
+        Parameters
+        ----------
+        path : path-like
+            ``.nff`` or ``.nff.gz``.
+
+        Returns
+        -------
+        Scene
+            What cannot be read is left out, and named in its notices.
+
+        Raises
+        ------
+        SceneError
+            When there is no such file, it cannot be read, or it holds nothing of an NFF scene.
+        """
         from .nff import read_nff
         return read_nff(path)
 

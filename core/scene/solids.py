@@ -129,17 +129,55 @@ class Combination:
 
 
 def union(first, *others, **more):
-    """All that is in any of the solids."""
+    """All that is in any of the solids.
+
+    Parameters
+    ----------
+    first, *others : Solid
+        Closed solids, combinations, or closed meshes (:func:`mesh`).
+    **more
+        Keywords of :class:`Combination`.
+
+    Returns
+    -------
+    Combination
+        Of a single solid, that itself. Solids that are not closed are named, and left out, when a structure is built.
+    """
     return _halves(UNION, [first, *others], more)
 
 
 def intersection(first, *others, **more):
-    """What is in all of the solids."""
+    """What is in all of the solids; parameters and result as for :func:`union`.
+
+    Parameters
+    ----------
+    first, *others : Solid
+    **more
+        Keywords of :class:`Combination`.
+
+    Returns
+    -------
+    Combination
+    """
     return _halves(INTERSECTION, [first, *others], more)
 
 
 def difference(first, *others, **more):
-    """What is in the first solid and in none of the others."""
+    """What is in the first solid and in none of the others; as for :func:`union`.
+
+    Parameters
+    ----------
+    first : Solid
+        What is cut.
+    *others : Solid
+        What is taken away.
+    **more
+        Keywords of :class:`Combination`.
+
+    Returns
+    -------
+    Combination
+    """
     return Combination(DIFFERENCE, first, union(*others), **more) if others else first
 
 
@@ -152,29 +190,99 @@ def _halves(op, parts, more):
 
 
 def mesh(geometry, matrix=None, **more):
-    """A closed mesh as part of a combination."""
+    """A closed mesh as part of a combination.
+
+    Parameters
+    ----------
+    geometry : Mesh
+        Whose surface encloses a volume.
+    matrix : array_like, shape (4, 4), optional
+        Affine map from the mesh's space to that of the combination; by default they are the same.
+    **more
+        Keywords of :class:`Solid`.
+
+    Returns
+    -------
+    Solid
+    """
     return Solid("mesh", _IDENTITY.copy() if matrix is None else matrix, values={"mesh": geometry}, **more)
 
 
 def sphere(centre, radius, **more):
-    """A sphere by centre and radius; keywords of :class:`Solid` follow, here and below."""
+    """A sphere.
+
+    Parameters
+    ----------
+    centre : sequence of 3 float
+        In the space of the object, as all places here and below.
+    radius : float
+    **more
+        Keywords of :class:`Solid`: slot, name and the like.
+
+    Returns
+    -------
+    Solid
+    """
     return Solid("sphere", _columns((radius, 0, 0), (0, radius, 0), (0, 0, radius), centre), **more)
 
 
 def box(lo, hi, **more):
-    """An axis-aligned box by two opposite corners."""
+    """An axis-aligned box.
+
+    Parameters
+    ----------
+    lo, hi : sequence of 3 float
+        Two opposite corners.
+    **more
+        Keywords of :class:`Solid`.
+
+    Returns
+    -------
+    Solid
+    """
     lo, hi = np.asarray(lo, float), np.asarray(hi, float)
     half = 0.5 * hi - 0.5 * lo
     return Solid("box", _columns((half[0], 0, 0), (0, half[1], 0), (0, 0, half[2]), 0.5 * lo + 0.5 * hi), **more)
 
 
 def cylinder(base, apex, radius, capped=True, **more):
-    """A cylinder by the ends of its axis and its radius."""
+    """A cylinder.
+
+    Parameters
+    ----------
+    base, apex : sequence of 3 float
+        The ends of its axis.
+    radius : float
+    capped : bool
+        Whether discs close both ends; only what is closed can be combined.
+    **more
+        Keywords of :class:`Solid`.
+
+    Returns
+    -------
+    Solid
+    """
     return Solid("cylinder", _about_axis(base, apex, radius), values={"capped": capped}, **more)
 
 
 def cone(base, apex, base_radius, apex_radius=0.0, capped=True, **more):
-    """A cone, or the frustum of one, by the ends of its axis and the radii there."""
+    """A cone, or the frustum of one.
+
+    Parameters
+    ----------
+    base, apex : sequence of 3 float
+        The ends of its axis.
+    base_radius, apex_radius : float
+        The radii there.
+    capped : bool
+        Whether discs close its ends; only what is closed can be combined.
+    **more
+        Keywords of :class:`Solid`.
+
+    Returns
+    -------
+    Solid
+    """
     if abs(apex_radius) > abs(base_radius):
         base, apex, base_radius, apex_radius = apex, base, apex_radius, base_radius
     ratio = apex_radius / base_radius if base_radius else 0.0
@@ -182,7 +290,19 @@ def cone(base, apex, base_radius, apex_radius=0.0, capped=True, **more):
 
 
 def pyramid(lo, hi, **more):
-    """A pyramid that fills an axis-aligned box: its base is the box's lowest face, its apex the middle of the highest."""
+    """A pyramid that fills an axis-aligned box: its base is the box's lowest face, its apex the middle of the highest.
+
+    Parameters
+    ----------
+    lo, hi : sequence of 3 float
+        The box's lowest and highest corners.
+    **more
+        Keywords of :class:`Solid`.
+
+    Returns
+    -------
+    Solid
+    """
     lo, hi = np.asarray(lo, float), np.asarray(hi, float)
     half, middle = 0.5 * hi - 0.5 * lo, 0.5 * lo + 0.5 * hi
     return Solid("pyramid", _columns((half[0], 0, 0), (0, half[1], 0), (0, 0, hi[2] - lo[2]), (middle[0], middle[1], lo[2])), **more)
@@ -198,6 +318,17 @@ def polygon(points, normals=None, **more):
     points : array_like, shape (k, 3)
     normals : array_like, shape (3, 3), optional
         Shading normals at the corners of a triangle; for more corners see :func:`patch`.
+    **more
+        Keywords of :class:`Solid`.
+
+    Returns
+    -------
+    Solid
+
+    Raises
+    ------
+    SceneError
+        For corners of another shape.
     """
     points = np.asarray(points, float) if len(points) else np.zeros((0, 3))
     if points.ndim != 2 or points.shape[1] != 3:
@@ -215,6 +346,8 @@ def patch(points, normals, **more):
     ----------
     points, normals : array_like, shape (k, 3)
         As for :func:`polygon`.
+    **more
+        Keywords of :class:`Solid`, for all of them.
 
     Returns
     -------
@@ -257,7 +390,17 @@ def _about_axis(base, apex, radius):
 
 
 def bounds(solid):
-    """Box (lo, hi) of a solid in its list's space."""
+    """The axis-aligned box of a solid, exact but for combinations, whose operands' boxes are combined.
+
+    Parameters
+    ----------
+    solid : Solid
+
+    Returns
+    -------
+    lo, hi : ndarray, shape (3,)
+        In the space of its object.
+    """
     low, high = extent(solid, np.eye(3))
     return low, high
 
@@ -309,5 +452,15 @@ def extent(solid, axes):
 
 
 def slots(solid):
-    """Material slots of a solid's parts, by their numbers: Hits.part tells which part's surface was met."""
+    """Material slots of a solid's parts.
+
+    Parameters
+    ----------
+    solid : Solid
+
+    Returns
+    -------
+    list of int
+        By the parts' numbers: :attr:`Hits.part` tells which part's surface was met.
+    """
     return [leaf.slot for leaf in flatten(solid)[1]] if solid.kind == "csg" else [solid.slot]
