@@ -21,6 +21,15 @@ bpy.context.preferences.view.show_splash = False
 enable_checkout()
 
 
+def until(condition, name):
+    """Steps until something is the case, which on a busy machine may take a while."""
+    for _ in range(40):
+        yield name
+        if condition():
+            return
+    raise AssertionError(f"{name}: it took too long")
+
+
 def in_view():
     """The context of the 3D view: timers run without one."""
     window = bpy.context.window_manager.windows[0]
@@ -49,7 +58,7 @@ def tick():
         if not taken or settled():
             with in_view():
                 if steps is None:
-                    names = runpy.run_path(script)
+                    names = runpy.run_path(script, {"until": until})
                     steps, moving = names["steps"](), names.get("MOVING", False)
                 taken, seen, looks = next(steps, None), None, 0
                 if taken is None:

@@ -9,15 +9,6 @@ from bl_ext.user_default.rayscope.addon.show import preview
 folder = Path(sys.argv[sys.argv.index("--") + 2])
 
 
-def until(condition, name):
-    """Steps until something is the case."""
-    for _ in range(20):
-        yield name
-        if condition():
-            return
-    raise AssertionError(f"{name}: it took too long; {[p._status() for p in preview._previews]}")
-
-
 def finished():
     return any(p.painter is not None and p.painter.job is not None and not p.painter.job.error and not p.busy for p in preview._previews)
 
@@ -52,8 +43,7 @@ def steps():
     yield "turning"
     yield from until(finished, "turned")
     space.shading.type = "SOLID"
-    yield "left"
-    assert not [thread.name for thread in threading.enumerate() if thread.name.startswith("rayscope")]
+    yield from until(lambda: not [thread for thread in threading.enumerate() if thread.name.startswith("rayscope")], "left")
 
     bpy.context.preferences.view.render_display_type = "NONE"
     scene.render.filepath = str(folder / "f12.png")

@@ -48,13 +48,13 @@ def steps():
     built = session.built_of(scene)
     bpy.ops.rayscope.point("INVOKE_DEFAULT")
     window.event_simulate(type="MOUSEMOVE", value="NOTHING", x=540, y=420)
-    yield "pointed"
+    yield from until(lambda: built.pointed >= 0, "pointed")
     log = {"pointed": built.pointed, "code": int(built.cells.code[built.pointed]), "count": int(built.cells.count[built.pointed])}
     window.event_simulate(type="MOUSEMOVE", value="NOTHING", x=75, y=130)
-    yield "beside"
+    yield from until(lambda: built.pointed < 0, "beside")
     log["beside"] = built.pointed
     window.event_simulate(type="MOUSEMOVE", value="NOTHING", x=540, y=420)
-    yield "again"
+    yield from until(lambda: built.pointed >= 0, "again")
     window.event_simulate(type="LEFTMOUSE", value="PRESS", x=540, y=420)
     window.event_simulate(type="LEFTMOUSE", value="RELEASE", x=540, y=420)
     yield "kept"
@@ -65,11 +65,11 @@ def steps():
     yield "no beam"
     bpy.ops.rayscope.point("INVOKE_DEFAULT")
     window.event_simulate(type="MOUSEMOVE", value="NOTHING", x=540, y=420)
-    yield "beam"
+    yield from until(lambda: built.beam is not None, "beam")
     log["candidates"] = len(built.beam.items)
     window.event_simulate(type="ESC", value="PRESS", x=540, y=420)
     window.event_simulate(type="ESC", value="RELEASE", x=540, y=420)
-    yield "beam gone"
+    yield from until(lambda: built.beam is None, "beam gone")
     log["beam"] = built.beam is not None
     folder = Path(sys.argv[sys.argv.index("--") + 2])
     (folder / "log.json").write_text(json.dumps(log))

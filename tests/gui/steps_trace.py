@@ -1,6 +1,7 @@
-"""For test_interface.py: trace with the interface alive, stop with Esc, and say how long that took."""
+"""For test_interface.py: trace with the interface alive, stop with Esc, and say what went on meanwhile."""
 import json
 import sys
+import threading
 import time
 from pathlib import Path
 
@@ -15,8 +16,8 @@ ticks = []
 MOVING = True  # redraws of the whole window would be measured too
 
 
-def watch_the_thread(cpu):
-    """Note the thread's own processor time when it last went on, and when it ended."""
+def watch_the_thread(cpu, kept):
+    """Note the thread's own processor time when it last went on, and when it ended; it then stays until the operator has."""
     run, progress = work.Job.run, work.Job.progress
 
     def going_on(self, fraction):
@@ -26,13 +27,14 @@ def watch_the_thread(cpu):
     def ending(self):
         run(self)
         cpu["ended"] = time.thread_time()
+        log.setdefault("not waited for", kept.wait(100))
 
     work.Job.run, work.Job.progress = ending, going_on
 
 
 def tick():
-    """How often Blender's main loop comes round."""
-    ticks.append(time.perf_counter())
+    """Blender's main loop comes round."""
+    ticks.append(work.current() is not None)
     return 0.02
 
 
@@ -50,7 +52,7 @@ def steps():
     bpy.context.object.modifiers.new("Subdivision", "SUBSURF").levels = 2
     bpy.context.object.rotation_euler = 0.6, 0.0, 0.8
     scene.render.resolution_x, scene.render.resolution_y = 800, 600
-    scene.rayscope.core, scene.rayscope.samples = "fast", 256
+    scene.rayscope.core, scene.rayscope.samples = "fast", 1024
     area = bpy.context.area
     area.spaces.active.show_region_ui = True
     window, screen = bpy.context.window, bpy.context.screen
@@ -62,49 +64,29 @@ def steps():
     sidebar.active_panel_category = "Rayscope"
     yield "tab"
 
-    cpu = {}
-    watch_the_thread(cpu)
+    cpu, kept = {}, threading.Event()
+    watch_the_thread(cpu, kept)
     assert bpy.ops.rayscope.trace("INVOKE_DEFAULT") == {"RUNNING_MODAL"}
     assert work.current() is None, "a run of more than 10 s must ask first"
     yield "asked"
     window.event_simulate(type="RET", value="PRESS", x=640, y=400)
     window.event_simulate(type="RET", value="RELEASE", x=640, y=400)
-    for _ in range(3):
-        yield "going"
-        if work.current():
-            break
-    assert work.current() is not None, "Enter in the dialog must start it"
+    yield from until(work.current, "going")  # Enter in the dialog starts it
     bpy.app.timers.register(tick)
-    yield "running"
+    yield from until(lambda: sum(ticks) > 20 and work.current().fraction > 0.1, "running")
     bpy.app.timers.unregister(tick)
-    log["ticks_per_second"] = len(ticks) / (ticks[-1] - ticks[0])
     try:
         bpy.ops.rayscope.build("INVOKE_DEFAULT")
     except RuntimeError as error:
         log["second"] = str(error)
 
-    job, times = work.current(), {}
-    cancel, end = work.Job.cancel, operators.Work._end
-    work.Job.cancel = lambda self: (times.setdefault("asked", time.perf_counter()), cancel(self))[1]
-    operators.Work._end = lambda self, task, job: (times.setdefault("kept", time.perf_counter()), end(self, task, job))[1]
+    job, end = work.current(), operators.Work._end
+    operators.Work._end = lambda self, task, job: (end(self, task, job), kept.set())[0]
     log["fraction"] = job.fraction
-
-    def press():
-        times["pressed"] = time.perf_counter()
-        window.event_simulate(type="ESC", value="PRESS", x=200, y=400)
-        window.event_simulate(type="ESC", value="RELEASE", x=200, y=400)
-
-    def watch():
-        if job.running or "kept" not in times:
-            return 0.005
-        times["ended"] = time.perf_counter()
-
-    bpy.app.timers.register(press, first_interval=1.5)  # not at once: after this step the harness has the whole window drawn
-    bpy.app.timers.register(watch)
-    while "ended" not in times:
-        yield "stopped"
-    log["cpu"] = cpu["ended"] - cpu["going"]
-    log.update({name: times[name] - times["pressed"] for name in ("asked", "kept", "ended")})
+    window.event_simulate(type="ESC", value="PRESS", x=200, y=400)
+    window.event_simulate(type="ESC", value="RELEASE", x=200, y=400)
+    yield from until(lambda: kept.is_set() and not job.running, "stopped")
+    log["cpu"] = cpu["ended"] - cpu["going"], cpu["ended"]
     pixels = image()
     log["share_done"] = float((pixels[..., 3] > 0).mean())
     log["mean"] = float(pixels[..., :3].mean())
@@ -113,18 +95,16 @@ def steps():
     # Another file, and disabling the add-on, while it runs.
     operators.ASK_SECONDS = float("inf")
     assert bpy.ops.rayscope.trace("INVOKE_DEFAULT") == {"RUNNING_MODAL"}
-    yield "again"
+    yield from until(work.current, "again")
     job = work.current()
-    assert job is not None
     bpy.ops.wm.read_homefile(use_factory_startup=True)
     assert not job.running and work.current() is None
     yield "another_file"
     scene = bpy.context.scene
     scene.rayscope.samples = 256
     assert bpy.ops.rayscope.trace("INVOKE_DEFAULT") == {"RUNNING_MODAL"}
-    yield "once_more"
+    yield from until(work.current, "once_more")
     job = work.current()
-    assert job is not None
     bpy.ops.preferences.addon_disable(module="bl_ext.user_default.rayscope")
     assert not job.running
     yield "disabled"

@@ -3,7 +3,8 @@
     pictures = window.pictures("overlay_scene.py", tmp_path)      # {name: (height, width, 3) uint8}
 
 runs tests/gui/overlay_scene.py in the window, with the add-on enabled. The script defines a generator `steps()`; at each `yield "name"` the window
-gets time to draw, is photographed, and the generator goes on. An exception in it fails the test. It runs with the 3D view's context.
+gets time to draw, is photographed, and the generator goes on; `yield from until(condition, "name")` does so until the condition holds. An exception
+in it fails the test. It runs with the 3D view's context.
 """
 import os
 import subprocess
@@ -19,7 +20,7 @@ sys.path.append(str(HERE.parents[1] / "tools"))
 from blenders import find_blender, find_window  # noqa: E402
 
 
-def pictures(script, folder, arguments=(), timeout=240):
+def pictures(script, folder, arguments=(), timeout=800):
     """Run `script` in a window; its pictures are also left in `folder` as PNG. `arguments` are handed to it in sys.argv after "--"."""
     command, why_not = find_blender()
     if command:
