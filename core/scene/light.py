@@ -1,5 +1,6 @@
 """Lights, in Blender's units: watts for point, spot and area, watts per square metre for the sun."""
 
+import math
 from dataclasses import dataclass
 
 
@@ -52,3 +53,26 @@ class Light:
     def has_extent(self):
         """Whether its shadows have soft edges."""
         return self.radius > 0.0 or self.kind == "area"
+
+    def fault(self, most):
+        """What is wrong with its numbers.
+
+        Parameters
+        ----------
+        most : float
+            What a coordinate may be at most.
+
+        Returns
+        -------
+        str
+            As "its ... is ..."; "" if nothing is.
+        """
+        aims = () if self.kind == "point" else self.direction
+        for name, values, limit in (
+            ("colour", self.colour, math.inf), ("position", () if self.kind == "sun" else self.position, most), ("direction", aims, math.inf),
+            ("radius", (self.radius,), math.inf), ("angle", (self.spot_angle, self.spot_blend), math.inf),
+            ("shape", [x for axis in (() if self.axes is None else self.axes) for x in axis], most),
+        ):  # fmt: skip
+            if not all(abs(x) < limit for x in values):  # of NaN too
+                return f"its {name} has a number that is NaN or infinite" + (f", or beyond {most:g}" if limit < math.inf else "")
+        return "its direction is zero" if len(aims) and not any(aims) else ""

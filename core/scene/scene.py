@@ -164,6 +164,9 @@ class Scene:
             self.objects = [*self.objects, Object("solids", Shapes(list(self.solids), "solids"))]
             self.solids = []
         self.objects = [o for o in self.objects if self._usable(o)]
+        faults_of = [(light, light.fault(MAX_COORDINATE)) for light in self.lights]
+        self.lights = [light for light, fault in faults_of if not fault]
+        self.notices += [Notice(light.name, f"{fault}; the light was left out.") for light, fault in faults_of if fault]
         for mesh in {id(o.geometry): o.geometry for o in self.objects if isinstance(o.geometry, Mesh)}.values():
             bad = len(mesh) - int(np.count_nonzero(mesh.usable))
             if bad:

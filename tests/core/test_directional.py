@@ -510,3 +510,25 @@ def test_lights_in_awkward_places(core):
                    "ray-coherence"):
         assert np.array_equal(plain, trace(scene, core=core, size=size, depth=0, primary="image-directory", shadow=shadow).image), shadow
     assert plain[..., :3].max() > 0.1
+
+
+def test_of_thousands_of_lights_each_is_counted_once(monkeypatch):
+    """In the pure core, too: what is looked at for the figures grows with the lights, not with their square."""
+    from rayscope.core.pure.directional.quadtree import Cell
+    corners = np.random.default_rng(0).normal(size=(24, 3))
+    looked, walk = [], Cell.walk
+    monkeypatch.setattr(Cell, "walk", lambda self: looked.append(self) or walk(self))
+
+    def work(n):
+        lights = [Light(f"lamp {k}", "point", (1.0,) * 3, position=(0.1 * k, 0.0, 9.0)) for k in range(n)]
+        index = build(Scene.from_triangles(corners, np.arange(24).reshape(-1, 3), lights=lights), "light-buffer", "pure")
+        looked.clear()
+        for light in lights:
+            index.for_light(light).occluded([(0.0, 0.0, 0.0)], [light.position], t_max=1.0)
+        done = len(looked)
+        cells = [c for b in index.buffers.values() for _, root in b.faces.values() for c in walk(root) if not c.children]
+        assert index.figures["N_E"] == len(cells) and index.figures["N_ER"] == sum(len(c.entries) for c in cells) > 0
+        return done
+
+    few, many = work(20), work(80)
+    assert 0 < few and many < 6 * few

@@ -1,9 +1,13 @@
 """Hierarchies: both cores build and walk the same trees; they follow motion; primitives come and go."""
 
+import sys
+
 import numpy as np
 import pytest
 from rayscope.core import Scene, build, solids
 from rayscope.core.errors import SceneError
+from rayscope.core.fast.hierarchies.sorted_list import SortedList
+from rayscope.core.fast.hierarchies.volume_tree import _ranks
 from rayscope.core.figures import PER_RAY
 from rayscope.core.lab.motion import moved
 from rayscope.core.scene.layout import Layout
@@ -234,3 +238,42 @@ def test_cells_tell_the_real_volumes(core, name, kind, numbers):
     if kind == "sphere":                                # it reaches as far as its box, and holds the box's middle
         assert (np.abs(0.5 * (cells.lo + cells.hi) - cells.shape[:, :3]).max(axis=1) <= cells.shape[:, 3]).all()
         assert (cells.shape[:, :3] - cells.shape[:, 3:] <= cells.lo + 1e-9).all()
+
+
+@pytest.mark.parametrize("count", [True, False])
+@pytest.mark.parametrize("shadow", [True, False])
+def test_what_is_entered_at_the_same_place_is_tested_in_few_calls(count, shadow, monkeypatch):
+    """Identical triangles that rays miss, though they meet their boxes: one call for each took a second for a thousand."""
+    n, calls = 3000, []
+    scene = Scene.from_triangles([(0, 0, 0), (1, 0, 0), (0, 1, 1)] * n, np.arange(3 * n).reshape(-1, 3))
+    o, d = [(0.9, 0.9, 5.0), (0.8, 0.9, 5.0), (0.3, 0.3, 5.0)], [(0, 0, -1.0)] * 3
+    index, tested = build(scene, "sorted-list"), SortedList._test
+    monkeypatch.setattr(SortedList, "_test", lambda self, query, *pairs: calls.append(len(pairs[0])) or tested(self, query, *pairs))
+    if shadow:
+        found = index.occluded(o, d, count=count)
+        blocked, counts = found if count else (found, None)
+        assert blocked.tolist() == [False, False, True]
+        assert sum(calls) == 2 * n + 1
+        assert not count or counts["n_it"].tolist() == [n, n, 1]        # as each ray alone
+    else:
+        hits = index.closest(o, d, count=count)
+        assert hits.primitive.tolist() == [-1, -1, 0] and sum(calls) == 3 * n
+        assert not count or hits.n_it.tolist() == [n] * 3
+    assert len(calls) == n if shadow and count else len(calls) < 20
+
+
+@pytest.mark.parametrize("sizes", [(1, 2, 3), (40, 1, 17, 16, 500), (20_000,)], ids=str)
+def test_children_in_order_however_many(sizes):
+    """Their places among those of their node, the greatest first, of equal ones the later; in few passes."""
+    rng = np.random.default_rng(0)
+    group = np.repeat(3 * np.arange(len(sizes)), sizes)
+    value = rng.choice([-np.inf, 0.0, 0.5, 1.0], size=len(group))
+    calls = []
+    sys.setprofile(lambda frame, event, what: calls.append(event))
+    rank = _ranks(group, value)
+    sys.setprofile(None)
+    assert len(calls) < 500
+    for g in set(group.tolist()):
+        own = np.flatnonzero(group == g)
+        assert own[np.argsort(rank[own])].tolist() == sorted(own.tolist(), key=lambda k: (value[k], k), reverse=True)
+        assert sorted(rank[own].tolist()) == list(range(len(own)))

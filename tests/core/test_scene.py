@@ -126,3 +126,26 @@ def test_to_world_is_the_same_for_one_point_as_for_many():
     assert all(np.array_equal(many[k], to_world(m, points[k:k + 1])[0]) for k in range(50))
     assert to_world(inverse(m), many) == pytest.approx(points)
     assert mirrors(m) == (np.linalg.det(m) < 0)
+
+
+@pytest.mark.parametrize("core", ["pure", "fast"])
+@pytest.mark.parametrize("bad, words", [
+    ({"position": (0, math.nan, 5)}, "position has a number that is NaN or infinite"), ({"position": (0, math.inf, 5)}, "position"),
+    ({"position": (1e200, 0, 5)}, "beyond 1e"), ({"colour": (1, math.inf, 1)}, "colour"), ({"radius": math.nan}, "radius"),
+    ({"kind": "sun", "direction": (0, math.nan, 1)}, "direction"), ({"kind": "sun", "direction": (0, 0, 0)}, "direction is zero"),
+    ({"kind": "spot", "spot_angle": math.nan}, "angle"), ({"kind": "area", "axes": ((1, 0, 0), (0, math.inf, 0))}, "shape"),
+])
+def test_lights_that_are_nowhere_are_left_out_and_named(bad, words, core):
+    good = Light("lamp", "point", (9.0, 9.0, 9.0), (0.3, 0.3, 2.0))
+    scene = Scene.from_triangles(CORNERS, [(0, 1, 2)], lights=[Light(**{"name": "bad lamp", "kind": "point", "colour": (1, 1, 1), "position": (0, 0, 5), **bad}), good],
+                                 camera=Camera.look_at((0.3, 0.3, 3.0), (0.3, 0.3, 0.0), up=(0, 1, 0)))
+    (notice,) = scene.notices
+    assert notice.name == "bad lamp" and words in notice.text and "left out" in notice.text and scene.lights == [good]
+    picture = trace(scene, core=core, size=(5, 5), shadow="light-buffer").image
+    assert np.isfinite(picture).all() and picture[2, 2, 0] > 0.1
+
+
+def test_what_a_light_does_not_use_may_be_anything():
+    lights = [Light("sun", "sun", (1, 1, 1), position=(math.nan,) * 3), Light("lamp", "point", (1, 1, 1), direction=(0, 0, 0))]
+    scene = Scene(lights=lights)
+    assert scene.lights == lights and not scene.notices

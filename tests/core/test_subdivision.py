@@ -208,6 +208,21 @@ def test_references_too_many_are_refused_with_the_resolution_that_fits(monkeypat
     assert 2 < fits < 35 and build(scene, "grid", resolution=fits).figures["N_ER"] > 1000
 
 
+def test_primitives_that_overlap_everywhere_are_refused_before_their_references_are_made(monkeypatch):
+    """Of a million identical triangles it took minutes; what is looked at is counted."""
+    looked, reached = [], fast_grid.Grid._reached
+    monkeypatch.setattr(fast_grid.Grid, "_reached", lambda self, item, *more: looked.append(len(item)) or reached(self, item, *more))
+    monkeypatch.setattr(fast_grid, "free_memory", lambda: 3e7)
+    corners = [(0, 0, 0), (1, 0.1, 0.2), (0.2, 1, 0.9)]
+    identical = Scene.from_triangles(corners * 3000, np.arange(9000).reshape(-1, 3))
+    with pytest.raises(MemoryEstimateError, match="references to primitives.*Set resolution to"):
+        build(identical, "grid", resolution=64)
+    assert looked == [fast_grid.DRAWN]
+    # Boxes of which the primitives fill a small part are none too many.
+    thin = Scene.from_triangles([(0, 0, 0), (1, 1, 1), (0.99, 1, 1)] * 30, np.arange(90).reshape(-1, 3))
+    assert 64**3 * 30 > 0.5 * 3e7 / fast_grid.REFERENCE_BYTES > build(thin, "grid", resolution=64).figures["N_ER"] > 64 * 30
+
+
 def test_mailbox_saves_tests_and_nothing_else():
     scene, (o, d) = soup(60, 0.5), rays()
     for name in ("grid", "octree", "kd-tree", "bsp-tree", "separated-grid"):

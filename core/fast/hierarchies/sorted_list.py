@@ -2,15 +2,17 @@
 
 Primitives are tested in that order, until a hit is nearer than where the next volume begins. (Not: until the first hit.)
 Rays are taken in blocks of neighbours: volumes that none of a block can meet, by interval arithmetic on the slab test, are
-left out; the others are tested against its rays, all at once. Then each ray takes the next of its own list in every round.
+left out; the others are tested against its rays, all at once. Then each ray takes the next of its own list in every round,
+or all that it enters at the same place: no hit can come between these.
 """
 
 import numpy as np
 
 from ...hits import Cells
 from ..bounds import EPSILON, maker, meets
+from ..query import Occluded
 from ..structure import Structure
-from .volume_tree import follow
+from .volume_tree import follow, places
 from .wide import along_curve
 
 #: Pairs of rays and volumes tested at a time. Larger arrays would not stay in the caches, and each new one would be new
@@ -59,23 +61,35 @@ class SortedList(Structure):
         ray, volume, t_in = ray[order], volume[order], t_in[order]
         if query.counts:
             query.counts.steps(np.arange(rays.n))
-        # The place of each ray's next volume, and the end of its list.
+        # The place of each ray's next volume, the end of its list, and after each volume the next that is entered elsewhere.
         end = np.cumsum(np.bincount(ray, minlength=rays.n))
         place = np.concatenate([[0], end[:-1]])
-        going = np.arange(rays.n)
+        elsewhere = np.append(np.flatnonzero((ray[1:] != ray[:-1]) | (t_in[1:] != t_in[:-1])) + 1, len(ray))
+        going, most = np.arange(rays.n), 1
         while True:
             going = going[place[going] < end[going]]
             going = going[t_in[place[going]] <= query.t[going]]
             if not len(going):
                 return
+            now = place[going]
+            many = np.minimum(elsewhere[np.searchsorted(elsewhere, now, side="right")] - now, self._at_once(query, len(going), most))
+            own, which = np.repeat(going, many), places(now, many)[0]
             if query.counts:
-                query.counts.steps(going)
-                query.counts.elementary(going)
-            self._test(query, going, volume[place[going]])
-            place[going] += 1
+                query.counts.steps(own)
+                query.counts.elementary(own)
+            self._test(query, own, volume[which])
+            place[going] += many
+            most *= 2
+
+    def _at_once(self, query, n, most):
+        """Volumes entered at the same place, at most, that each of n rays takes now; where any hit will do, no more than twice what was in vain."""
+        if query.counts and (isinstance(query, Occluded) or self.primitives.structures()):
+            return 1                                    # what is counted is what a ray alone would do
+        fit = max(1, TESTS // n)
+        return min(fit, most) if isinstance(query, Occluded) else fit
 
     def _test(self, query, ray, volume):
-        """Test rays against all primitives of volumes, one a ray."""
+        """Test rays against all primitives of volumes, in pairs."""
         if len(self.volumes) == self.primitives.n:      # one each
             query.test(ray, self.item[volume])
             return

@@ -21,6 +21,8 @@ from .sieve import Sieve
 CELL_BYTES, REFERENCE_BYTES = 24, 24
 #: Pairs of a primitive and a cell looked at together in the build.
 PAIRS = 262_144
+#: Pairs drawn at random, which tell that there will be too many before they are made; and by how many standard errors.
+DRAWN, SURE = 65_536, 6.0
 
 
 class Grid(Structure):
@@ -103,6 +105,7 @@ class Grid(Structure):
         sure = (extent > 1).sum(axis=1) <= 1
         count = extent.prod(axis=1)
         limit = int(0.5 * free_memory() / REFERENCE_BYTES)
+        self._refuse_too_many_references(first, extent, np.where(sure, 0, count), limit - int(count[sure].sum()), limit)
         cells, items, total = [], [], 0
         order = np.concatenate([np.flatnonzero(sure), np.flatnonzero(~sure)])
         ends = np.cumsum(count[order])
@@ -123,11 +126,28 @@ class Grid(Structure):
                 items.append(item)
                 total += len(cell)
             if total > limit:
-                fits = self._that_fits(lambda cells: self._extent(cells)[0].prod(axis=1).sum() <= limit, (self.hi - self.lo).tolist())
-                raise MemoryEstimateError(too_many_references(self.NAME, self.resolution.tolist(), limit, fits))
+                raise self._too_many_references(limit)
             begin = end
             progress(begin / p.n)
         return np.concatenate(cells), np.concatenate(items)
+
+    def _refuse_too_many_references(self, first, extent, count, left, limit):
+        """Raise at once where primitives surely reach into more than `left` of the `count` cells of their boxes: there are many that overlap."""
+        ends = np.cumsum(count)
+        if ends[-1] <= left:
+            return
+        if left < 0:
+            raise self._too_many_references(limit)
+        pair = np.random.default_rng(0).integers(ends[-1], size=DRAWN)
+        item = np.searchsorted(ends, pair, side="right")
+        share = len(self._reached(item, pair - (ends - count)[item], first, extent, False)[0]) / DRAWN
+        if ends[-1] * (share - SURE * math.sqrt(share * (1.0 - share) / DRAWN)) > left:
+            raise self._too_many_references(limit)
+
+    def _too_many_references(self, limit):
+        """The error, with a resolution that fits."""
+        fits = self._that_fits(lambda cells: self._extent(cells)[0].prod(axis=1).sum() <= limit, (self.hi - self.lo).tolist())
+        return MemoryEstimateError(too_many_references(self.NAME, self.resolution.tolist(), limit, fits))
 
     def _reached(self, item, place, first, extent, sure):
         """Pairs (cell, item) where primitives reach into cells, of the `place`-th cells that their boxes reach into."""

@@ -45,7 +45,9 @@ class LightBuffer(Handing):
             # About a cell for each primitive, as there are six faces.
             along = resolution or min(64, max(2, math.ceil(math.sqrt(len(self.primitives) / 6))))
             self.divide = lambda footprints, *occludes: divide_evenly(footprints, along, z_buffer, *occludes)
-        self.max_bytes, self.buffers, self.bytes = max_bytes, {}, {}
+        self.max_bytes, self.buffers = max_bytes, {}
+        # Of each buffer: cells, empty ones, entries, bytes; and of all together, so that of thousands of lights each is counted once.
+        self._used, self._total = {}, [0, 0, 0, 0]
         self.extra = 2.0 * max(abs(c) for p in self.primitives for c in (*p.lo, *p.hi))
         self.lights = [light for light in getattr(self.scene, "lights", ()) if _fits(light)]
         if not self.lights:
@@ -110,16 +112,27 @@ class LightBuffer(Handing):
 
     def _make_room(self, number):
         """Give up the buffers not used for longest when all take too much memory."""
-        self.bytes[number] = memory_of(*(root for _, root in self.buffers[number].faces.values()))
-        while len(self.buffers) > 1 and sum(self.bytes[k] for k in self.buffers) > self.max_bytes:
-            self.buffers.pop(next(iter(self.buffers)))
-        leaves = [c for b in self.buffers.values() for _, root in b.faces.values() for c in root.walk() if not c.children]
-        self.figures.update(N_E=len(leaves), N_EE=sum(not c.entries for c in leaves), N_ER=sum(len(c.entries) for c in leaves),
-                            memory=sum(self.bytes[k] for k in self.buffers) + (self._second.figures["memory"] if self._second else 0))
+        roots = [root for _, root in self.buffers[number].faces.values()]
+        leaves = [cell for root in roots for cell in root.walk() if not cell.children]
+        own = (len(leaves), sum(not c.entries for c in leaves), sum(len(c.entries) for c in leaves), memory_of(*roots))
+        self._count(number, own)
+        while len(self.buffers) > 1 and self._total[3] > self.max_bytes:
+            oldest = next(iter(self.buffers))
+            del self.buffers[oldest]
+            self._count(oldest, None)
+        cells, empty, entries, used = self._total
+        self.figures.update(N_E=cells, N_EE=empty, N_ER=entries, memory=used + (self._second.figures["memory"] if self._second else 0))
         name = self.lights[number].name
-        if self.bytes[number] > self.max_bytes and len(self.notices) < NAMED and not any(n.name == name for n in self.notices):
-            self.notices.append(Notice(name, f"its buffer takes {self.bytes[number]} bytes, more than max_bytes = {self.max_bytes:g}. "
+        if own[3] > self.max_bytes and len(self.notices) < NAMED and not any(n.name == name for n in self.notices):
+            self.notices.append(Notice(name, f"its buffer takes {own[3]} bytes, more than max_bytes = {self.max_bytes:g}. "
                                        "Raise max_bytes, lower the resolution, or name another technique for shadow rays."))
+
+    def _count(self, number, own):
+        """Take what a buffer holds now into what all hold, in place of what it held before; None for one that is gone."""
+        before = self._used.pop(number, (0, 0, 0, 0))
+        if own is not None:
+            self._used[number] = own
+        self._total = [t - b + o for t, b, o in zip(self._total, before, own or (0, 0, 0, 0))]
 
 
 class OneLight(Structure):
