@@ -1,4 +1,4 @@
-"""Exact truth: rays against shapes and boxes, without any rounding.
+"""Exact truth: rays against shapes, and the cells they run through, without any rounding.
 
 Every number that comes in is taken for exactly what the float is, and worked on as a :class:`~fractions.Fraction`.
 Slow (tens of microseconds a test), and independent of both cores: this is what they are held against. t is in
@@ -171,6 +171,35 @@ def nearest(origin, direction, corners, t_min=0.0, t_max=math.inf):
         elif found[0] == best:
             numbers.append(k)
     return (best, numbers) if numbers else None
+
+
+def tree_sequence(cells, origin, direction, t_min=0.0, t_max=math.inf):
+    """The leaves that a ray runs through: grid, octree, kd-tree, anything whose cells fill their parents.
+
+    Parameters
+    ----------
+    cells : Cells
+        Parents before their children, as all structures give them.
+    origin, direction : sequence of 3 float
+    t_min, t_max : float
+
+    Returns
+    -------
+    list of (number, t_in, t_out)
+        In the ray's order. Leaves that it only touches have t_in = t_out; a ray that slides in a face between two
+        leaves runs through both.
+    """
+    met, found = {-1}, []
+    for k in range(len(cells)):
+        if int(cells.parent[k]) not in met:
+            continue
+        span = box(origin, direction, cells.lo[k].tolist(), cells.hi[k].tolist())
+        if span is None or max(span[0], t_min) > min(span[1], t_max):
+            continue
+        met.add(k)
+        if cells.leaf[k]:
+            found.append((k, max(span[0], t_min), min(span[1], t_max)))
+    return sorted(found, key=lambda leaf: leaf[1:])
 
 
 def error(t, exact):

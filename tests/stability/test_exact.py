@@ -61,24 +61,6 @@ class Visited(Watch):
             self.cells.append(number)
 
 
-def leaves_along(cells, origin, direction, t_max):
-    """The leaves that a ray runs through, up to t_max: (number, t_in, t_out) each, in the ray's order, exactly.
-
-    Leaves that it only touches have t_in = t_out; a ray that slides in a face between two leaves runs through both.
-    """
-    met, found = {-1}, []
-    for k in range(len(cells)):
-        if int(cells.parent[k]) not in met:
-            continue
-        span = exact.box(origin, direction, cells.lo[k].tolist(), cells.hi[k].tolist())
-        if span is None or max(span[0], 0.0) > min(span[1], t_max):
-            continue
-        met.add(k)
-        if cells.leaf[k]:
-            found.append((k, max(span[0], 0.0), min(span[1], t_max)))
-    return sorted(found, key=lambda leaf: leaf[1:])
-
-
 @pytest.mark.parametrize("name, parameters", [("grid", {"walk": w}) for w in ("exact", "add", "subtract")]
                          + [(n, {"walk": w}) for n in ("octree", "kd-tree") for w in ("root", "intervals", "links", "heap")], ids=str)
 def test_cells_that_a_ray_visits(name, parameters):
@@ -99,7 +81,7 @@ def test_cells_that_a_ray_visits(name, parameters):
         hit = index.closest_ray(ray, watch)
         visited = [number + shift for number in watch.cells]
         size = max(map(abs, d))
-        truth = leaves_along(cells, o, d, hit.t if hit else math.inf)
+        truth = exact.tree_sequence(cells, o, d, 0.0, hit.t if hit else math.inf)
         certain = [k for k, t_in, t_out in truth if (t_out - t_in) * size > rounding]
         assert [k for k in visited if k in set(certain)] == certain
         for k in visited:                                               # none that the ray passes by

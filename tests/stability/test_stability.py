@@ -13,7 +13,7 @@ from rayscope.core.command import main
 from rayscope.core.fast.query import Closest
 from rayscope.core.lab import stability
 from rayscope.core.lab.stability import examine as examining
-from rayscope.core.lab.stability import examine_pictures, plots, single, spawned, suite, sweeps
+from rayscope.core.lab.stability import examine_pictures, plots, single, spawned, suite, sweeps, walks
 from rayscope.core.lab.stability import truth as truths
 from rayscope.core.lab.stability.cases import cases
 from rayscope.core.lab.stability.examine import examine
@@ -21,6 +21,7 @@ from rayscope.core.lab.stability.pictures import pictures
 from rayscope.core.lab.stability.rays import corners_of
 from rayscope.core.lab.stability.trial import asked, built, scene_and_rays
 from rayscope.core.lab.stability.truth import truth
+from rayscope.core.pure.ray import Ray
 
 CASES = {c.name: c for c in cases()}
 PICTURES = {c.name: c for c in pictures()}
@@ -123,6 +124,45 @@ def test_cases_are_what_they_say():
     corners = corners_of(CASES["slivers 1e6"].make(np.random.default_rng(0)))
     edges = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2)
     assert (edges.max(axis=1) / edges.min(axis=1)).min() > 1e4
+
+
+@pytest.mark.parametrize("case", [c for c in CASES.values() if c.name in walks.CASES], ids=lambda c: c.name)
+def test_rays_are_led_through_the_cells_that_they_run_through(case, known, monkeypatch):
+    monkeypatch.setattr(walks, "RAYS", 6)
+    scene, batch, _ = given(known, case)
+    rows = walks.walks(case, scene, batch)
+    assert len(rows) == 11 and not [row for row in rows if row["verdict"] != "ok"]
+    assert min(row["cells"] for row in rows) > 2
+
+
+@pytest.mark.parametrize("spoil, column", [(lambda numbers: numbers[1:], "wrong"), (lambda numbers: numbers[::-1], "wrong"),
+                                           (lambda numbers: [*numbers, *range(20)], "strayed")])
+def test_a_ray_led_astray_is_seen_and_replayed(spoil, column, known, tmp_path):
+    case = CASES["friendly"]
+    scene, batch, _ = given(known, case)
+    with pytest.MonkeyPatch.context() as patch:
+        watch = walks._Leaves
+        patch.setattr(walks, "_Leaves", lambda: SimpleNamespace(numbers=[]))
+        patch.setattr(walks, "Ray", lambda *ray: ray)
+
+        def built_spoilt(*arguments, **more):
+            index = built(*arguments, **more)
+            closest = index.closest_ray
+
+            def spoilt(ray, into):
+                heard = watch()
+                hit = closest(Ray(*ray), heard)
+                into.numbers[:] = spoil(heard.numbers)
+                return hit
+            index.closest_ray = spoilt
+            return index
+        patch.setattr(walks, "built", built_spoilt)
+        row = walks.walked(case, scene, batch, "kd-tree", {"walk": "links"})
+        assert row[column] > 0 and row["verdict"] != "ok" and row["bad"]
+    path = tmp_path / "walk.json"
+    path.write_text(json.dumps(stability.failure(row, 0, False)))
+    again = stability.replay(path)
+    assert not again["failed"] and again["row"]["cells"] > 0 and main(["stability", "--replay", str(path)]) == 0
 
 
 def test_what_is_wrong_with_a_scene_is_told_and_refused(monkeypatch):
@@ -288,7 +328,7 @@ def test_the_verb(tmp_path, monkeypatch, capsys):
     assert main(["stability", "--small", "--techniques", "bvh", "--cases", "lost elsewhere,scale 1e8,critical angle", "--out", str(tmp_path), "--json"]) == 0
     record = json.loads(capsys.readouterr().out)
     assert {r["case"] for r in record["rows"]} == {"friendly", "lost elsewhere", "scale 1e8"} and not record["failed"]
-    assert {"table.txt", "table.csv", "exact.csv", "float32.csv", "pictures.csv", "stability.json"} <= {p.name for p in tmp_path.iterdir()}
+    assert {"table.txt", "table.csv", "exact.csv", "walks.csv", "float32.csv", "pictures.csv", "stability.json"} <= {p.name for p in tmp_path.iterdir()}
     assert {r["case"] for r in record["pictures"]} == {"friendly picture", "critical angle"}
     assert main(["stability", "--cases", "no such"]) == 2 == main(["stability", "--resume"])
 

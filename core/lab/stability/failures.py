@@ -19,6 +19,7 @@ from .rays import Batch, corners_of
 from .scenes import REFUSED
 from .trial import RAYS, asked, built, given, scene_and_rays, variant_text
 from .truth import refusal, truth_row
+from .walks import walked
 
 
 def failure(row, seed, full):
@@ -30,6 +31,8 @@ def failure(row, seed, full):
     """
     if row["case"] in REFUSED or row["case"] in {c.name for c in pictures(full)}:
         return {k: row[k] for k in ("case", "technique", "core", "verdict", "bad")} | {"full": full, "seed": seed}
+    if "cells" in row:
+        return {k: row[k] for k in ("case", "technique", "core", "parameters", "verdict", "bad", "cells")} | {"full": full, "seed": seed}
     case = next(c for c in cases(full) if c.name == row["case"])
     scene, batch = scene_and_rays(case, seed, case.n or RAYS[full])
     rays = [{"number": r, "o": [x.hex() for x in batch.o[r].tolist()], "d": [x.hex() for x in batch.d[r].tolist()],
@@ -80,6 +83,10 @@ def replay(path, say=lambda line: None):
         if saved["case"] in {c.name for c in pictures(saved["full"])}:
             return _replayed_picture(saved)
         case = next(c for c in cases(saved["full"]) if c.name == saved["case"])
+        if "cells" in saved:
+            scene, batch, _ = given(case, saved["seed"], saved["full"])
+            row = walked(case, scene, batch, saved["technique"], saved["parameters"])
+            return {"rays": [], "row": row, "truth": {"verdict": "ok"}, "failed": row["verdict"] != "ok"}
         rays = [[[float.fromhex(x) for x in ray[k]] for k in "od"] + [float.fromhex(ray[k])
                                                                       for k in ("t_min", "t_max")]
                 for ray in saved["rays"]]

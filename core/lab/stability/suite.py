@@ -13,6 +13,7 @@ from .pictures import pictures
 from .single import single_precision
 from .trial import given
 from .truth import refusals, truth_row
+from .walks import walks
 
 
 def contestants(names=None):
@@ -101,6 +102,7 @@ def run(full=False, seed=0, names=None, only=None, seconds=None, timed=True, say
     -------
     dict
         rows : one a technique, core and case, with the keys COLUMNS. truth : one a case, with the keys TRUTH_COLUMNS.
+        walks : one a walk and case, with the keys WALK_COLUMNS.
         pictures : one a technique, core and picture, with the keys of `examine_pictures`. single : see
         :func:`single_precision`.
         left_out : list of str. failures : rows whose verdict is not ok. failed : bool. run : seed and full.
@@ -114,8 +116,8 @@ def run(full=False, seed=0, names=None, only=None, seconds=None, timed=True, say
     names_of_cases = [c.name for c in (*everything, *drawn)]
     unknown = set(only or ()) - set(names_of_cases)
     if unknown:
-        raise SceneError(f"stability: there is no case {', '.join(sorted(unknown))}. Cases: {', '.join(names_of_cases)}.")
-    began, rows, truths, drawn_rows, left_out, base, known, pace = time.monotonic(), [], [], [], [], {}, {}, {}
+        raise SceneError(f"There is no case {', '.join(sorted(unknown))}. Cases: {', '.join(names_of_cases)}.")
+    began, rows, truths, led, drawn_rows, left_out, base, known, pace = time.monotonic(), [], [], [], [], [], {}, {}, {}
     kept = Kept(kept, {"seed": seed, "full": full, "names": names and sorted(names), "timed": timed}, resume)
     with_pictures = not only or any(c.name in only for c in drawn)
     # what times are compared with
@@ -138,7 +140,7 @@ def run(full=False, seed=0, names=None, only=None, seconds=None, timed=True, say
     def rays_work(case):
         """The rows of a case with rays."""
         scene, batch, right = given(case, seed, full)
-        record = {"truth": truth_row(case, scene, batch, right, full), "rows": [], "left_out": []}
+        record = {"truth": truth_row(case, scene, batch, right, full), "walks": walks(case, scene, batch, names), "rows": [], "left_out": []}
         for name, core in contestants(names):
             if core not in case.cores:
                 continue
@@ -173,13 +175,14 @@ def run(full=False, seed=0, names=None, only=None, seconds=None, timed=True, say
                 (base if case in everything else pace)[row["technique"], row["core"]] = row
         if case in everything:
             truths.append(record["truth"])
+            led += record.get("walks", [])
             rows += record["rows"]
         else:
             drawn_rows += record["rows"]
     truths += refusals(seed) if not only else []
     say("float32")
     single = single_precision([c for c in chosen if c in everything], seed) if names is None else []
-    failures = [r for r in rows + truths + drawn_rows + single if not r["verdict"].startswith(("ok", "refused"))]
-    return {"rows": rows, "truth": truths, "pictures": drawn_rows, "single": single, "left_out": left_out,
+    failures = [r for r in rows + truths + led + drawn_rows + single if not r["verdict"].startswith(("ok", "refused"))]
+    return {"rows": rows, "truth": truths, "walks": led, "pictures": drawn_rows, "single": single, "left_out": left_out,
             "failures": failures, "failed": bool(failures), "seconds": time.monotonic() - began,
             "run": {"seed": seed, "full": full}}

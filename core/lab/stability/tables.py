@@ -11,6 +11,7 @@ from .trial import variant_text
 COLUMNS = ("case", "technique", "core", "parameters", "rays", "wrong", "lost", "ghost", "leaks", "self_hits", "t_error",
            "t_ulp", "t_relative", "slow", "work", "verdict")
 SINGLE_COLUMNS = ("case", "technique", "rays", "lost", "t_error", "t_error32", "warned", "verdict")
+WALK_COLUMNS = ("case", "technique", "parameters", "rays", "cells", "wrong", "strayed", "verdict")
 TRUTH_COLUMNS = ("case", "rays", "lost", "ghost", "wrong", "leaks", "t_ulp", "t_relative", "t_error", "off_surface",
                  "verdict")
 
@@ -34,17 +35,24 @@ def text(result):
                           ("technique", "core", "cases", "runs", "rays", "wrong", "lost", "ghost", "leaks", "self_hits",
                            "t_error", "slowest")), "",
              "Brute force against exact arithmetic:", "", report.table(result["truth"], TRUTH_COLUMNS), "",
+             "Cells that rays are led through, against exact arithmetic:", "", report.table(_walked(result["walks"]), WALK_COLUMNS), "",
              "Pictures, those that took longest by their work or failed:", "",
              report.table(_worst(result["pictures"]), examine_pictures.COLUMNS), "",
              "Float32, against ours:", "", report.table(result["single"], SINGLE_COLUMNS), "",
              "runs: of cases, with the defaults and every choice of the parameters. rays: with those that leave surfaces.",
              "t_error: of t, in 2^-52 max(|t|, size of the scene); 8 are allowed between techniques.",
              f"t_error32: of t, in 2^-23 of the largest coordinate; up to {FAR32:g} sizes of the scene from the origin less than {T_BOUND32:g}, with no hit lost, are expected.",
+             "cells: leaves that rays surely run through before they hit. wrong: rays led otherwise. strayed: leaves that their ray passes by.",
              "off_surface: distance of the ray's point at t from the primitive, in 2^-52 of the largest coordinate, the ray's origin included.",
              "Both cores test triangles in float64; boxes in float32 (numpy core, hierarchies) are rounded outwards and lose nothing."]
     for row in result["failures"]:
         lines.append(f"FAILED {variant_text(row['technique'], row.get('parameters', {}))} ({row['core']}) on {row['case']}: {row['verdict']}")
     return "\n".join(lines)
+
+
+def _walked(rows):
+    """Rows of walks with their parameters in words."""
+    return [row | {"parameters": variant_text("", row["parameters"])[2:]} for row in rows]
 
 
 def _worst(rows):
@@ -71,6 +79,7 @@ def write(result, folder, say=lambda line: None):
                            report.to_csv([row | {"parameters": variant_text("", row["parameters"])[2:]}
                                           for row in result["rows"]], COLUMNS)),
                           ("exact.csv", report.to_csv(result["truth"], TRUTH_COLUMNS)),
+                          ("walks.csv", report.to_csv(_walked(result["walks"]), WALK_COLUMNS)),
                           ("float32.csv", report.to_csv(result["single"], SINGLE_COLUMNS)),
                           ("pictures.csv", report.to_csv(result["pictures"], examine_pictures.COLUMNS))):
         (folder / name).write_text(content, encoding="utf-8")
