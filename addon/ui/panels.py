@@ -44,7 +44,7 @@ def draw_job(layout, operator, text, icon):
 
 def built_text(built):
     """What is built: another technique may have been chosen since."""
-    return f"{built.technique}, before the scene changed" if built.stale else f"{built.technique}, {len(built.cells):,} cells"
+    return f"{built.technique}, out of date" if built.stale else f"{built.technique}, {len(built.cells):,} cells"
 
 
 def draw_figures(layout, scene):

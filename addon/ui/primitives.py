@@ -83,6 +83,7 @@ class Primitive:
 
 class RAYSCOPE_PT_primitive(Sidebar, Primitive, bpy.types.Panel):
     bl_options = {"DEFAULT_CLOSED"}
+    bl_order = 1  # below the others: it comes and goes with what is selected
 
 
 class RAYSCOPE_OBJECT_PT_primitive(Primitive, bpy.types.Panel):

@@ -39,6 +39,8 @@ def read_file(path, open_in_blender=None, size=None):
     """
     path = Path(path)
     name = path.name.lower()
+    if path.is_dir():
+        raise SceneError(f"{path}: this is a folder; name a file in it.")
     if not name.endswith(ENDINGS):
         raise SceneError(f"{path}: files of this kind are not read. Known endings: {', '.join(ENDINGS)}.")
     if not path.is_file():

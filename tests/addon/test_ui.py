@@ -2,7 +2,7 @@
 import bpy
 import pytest
 from bl_ext.user_default.rayscope.addon import session, work
-from bl_ext.user_default.rayscope.addon.ui import operators, panels, properties
+from bl_ext.user_default.rayscope.addon.ui import operators, panels, primitives, properties
 from bl_ext.user_default.rayscope.core import catalogue
 from bl_ext.user_default.rayscope.core.figures import FIGURES
 
@@ -119,13 +119,19 @@ def test_a_structure_gets_stale_when_an_object_moves_but_not_when_a_setting_chan
     assert not session.built_of(scene).stale
     bpy.data.objects["Cube"].location.x += 1
     bpy.context.view_layer.update()
-    assert session.built_of(scene).stale
+    assert session.built_of(scene).stale and panels.built_text(session.built_of(scene)) == "bvh, out of date"
     bpy.ops.rayscope.build()
     assert not session.built_of(scene).stale
     bpy.data.objects.remove(bpy.data.objects["Cube"])
     bpy.ops.mesh.primitive_cube_add()
     bpy.ops.mesh.primitive_cube_add()
     assert session.built_of(scene).stale
+
+
+def test_a_panel_that_comes_and_goes_moves_no_other(scene):
+    """What is selected decides whether there is a primitive's panel; it stands below those that are always there."""
+    always = panels.RAYSCOPE_PT_structure, panels.RAYSCOPE_PT_trace
+    assert primitives.RAYSCOPE_PT_primitive.bl_order > max(getattr(panel, "bl_order", 0) for panel in always)
 
 
 def test_clear(scene):
@@ -169,7 +175,7 @@ def test_what_was_left_out_is_listed(scene):
 def test_nothing_starts_while_a_job_runs(scene):
     import threading
     go = threading.Event()
-    work.start("Tracing", lambda progress: go.wait(20))
+    work.start("Tracing", lambda progress: go.wait(600))
     try:
         for operator in (bpy.ops.rayscope.build, bpy.ops.rayscope.trace):
             with pytest.raises(RuntimeError, match="Tracing is still running: wait for it, or press Esc"):

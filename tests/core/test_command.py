@@ -235,6 +235,7 @@ WRONG = [
     (["compare", "--rays", "0"], "0 does not lie"),
     (["compare", "--rays", "9", "--out", "/proc/out"], "--out /proc/out: the folder cannot be made"),
     (["compare", "--rays", "9", "--out", __file__], "this is a file; name a folder"),
+    (["stability", "--cases", "friendlier"], "rayscope stability: There is no case friendlier"),
     (["bench", "--out", "plots"], "--directional"),
     (["bench", "--only", "balls"], "--automatic"),
     (["compare", "--seed", "-1"], "-1"),
@@ -247,6 +248,12 @@ def test_a_wrong_call_is_one_line_that_names_it(run, argv, names):
     assert code == WRONG_CALL and not out
     assert names in err[-1] and err[-1].startswith("rayscope")
     assert len([line for line in err if line.startswith(("rayscope", "Traceback", "  "))]) == 1
+
+
+def test_a_file_that_is_none(capfd, tmp_path):
+    for path, words in ((tmp_path, "this is a folder"), (tmp_path / "a.doc", "files of this kind"), (tmp_path / "a.nff", "no such file")):
+        assert main(["needs", str(path)]) == WRONG_CALL
+        assert f"{path}: " in (err := capfd.readouterr().err) and words in err
 
 
 def test_a_scene_without_what_is_needed(run):
