@@ -22,7 +22,7 @@ def file(tmp_path):
 
 def blender(*arguments, code=0):
     done = subprocess.run([bpy.app.binary_path, "-q", "-b", "--factory-startup", "--addons", PACKAGE, *map(str, arguments)],
-                          text=True, stdout=subprocess.PIPE, stderr=subprocess.PIPE, timeout=120)
+                          text=True, stdout=subprocess.PIPE, stderr=subprocess.PIPE, timeout=600)
     assert done.returncode == code and "Traceback" not in done.stderr + done.stdout, done.stdout + done.stderr
     return done
 

@@ -131,7 +131,7 @@ def test_bench_measures_against_blenders_tree(capfd):
 @pytest.mark.skipif(not bpy.app.module, reason="needs the bpy module")
 def test_python_m_rayscope(blend, tmp_path):
     done = subprocess.run([sys.executable, "-m", "rayscope", "compare", str(blend), "--rays", "50", "--techniques", "bvh,mathutils", "--json",
-                           "--out", str(tmp_path / "out")], capture_output=True, text=True, timeout=200, cwd=tmp_path)
+                           "--out", str(tmp_path / "out")], capture_output=True, text=True, timeout=600, cwd=tmp_path)
     assert done.returncode == DONE, done.stderr
     assert "Read blend" in done.stderr, "what Blender prints does not mix with the result"
     assert [row["technique"] for row in json.loads(done.stdout)["rows"]] == ["bvh", "mathutils"]
@@ -141,6 +141,6 @@ def test_python_m_rayscope(blend, tmp_path):
 @pytest.mark.skipif(bpy.app.module, reason="needs Blender itself")
 def test_blender_b_command(blend):
     done = subprocess.run([bpy.app.binary_path, "-b", str(blend), "--addons", "bl_ext.user_default.rayscope", "--command", "rayscope", "trace",
-                           "--size", "20x20"], capture_output=True, text=True, timeout=200, env=os.environ)
+                           "--size", "20x20"], capture_output=True, text=True, timeout=600, env=os.environ)
     assert done.returncode == DONE, done.stderr
     assert "primary" in done.stdout

@@ -66,5 +66,5 @@ def test_install_enable_disable_and_enable_again(zip_file, tmp_path):
     else:
         command = [bpy.app.binary_path, "-b", "--factory-startup", "--python-exit-code", "1", "--python", SCRIPT]
     environment = {**os.environ, "BLENDER_USER_RESOURCES": str(tmp_path)}
-    done = subprocess.run([*command, "--", zip_file], env=environment, text=True, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, timeout=120)
+    done = subprocess.run([*command, "--", zip_file], env=environment, text=True, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, timeout=600)
     assert done.returncode == 0 and "NOTHING LEFT BEHIND" in done.stdout, done.stdout

@@ -280,7 +280,7 @@ def test_the_command_reads_tags_and_settings_though_the_extension_is_not_enabled
         "os._exit(0)"
     )
     done = subprocess.run(
-        [sys.executable, "-c", code, str(tmp_path / "kept.blend")], text=True, capture_output=True, timeout=60
+        [sys.executable, "-c", code, str(tmp_path / "kept.blend")], text=True, capture_output=True, timeout=600
     )
     assert "[('Kept', 'Shapes'), ('Cube', 'Mesh')] ['Scene']" in done.stdout, (
         done

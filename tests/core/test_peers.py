@@ -130,7 +130,7 @@ def test_a_missing_package_is_named(technique, package, tmp_path):
             "from rayscope.core import Scene, build, MissingPackageError\n"
             f"try: build(Scene(), {technique!r})\nexcept MissingPackageError as error: print(error)\n"
             "print(len(build(Scene.from_triangles([(0, 0, 0), (1, 0, 0), (0, 1, 0)], [(0, 1, 2)]), 'brute').closest([(0, 0, 1)], [(0, 0, -1)])))")
-    said = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60,
+    said = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=600,
                           env={**os.environ, "PYTHONPATH": os.pathsep.join([str(tmp_path), *sys.path])})
     line, ok = said.stdout.splitlines()
     assert f"pip install {package}" in line and ok == "1"
