@@ -60,7 +60,7 @@ class Rays:
         n = origins.shape[1]
         if directions.shape[1] != n:
             raise ValueError(f"{n} origins but {directions.shape[1]} directions.")
-        t_min, t_max = (t if t.ndim == 0 else np.broadcast_to(t, (n,)) for t in (np.asarray(t, float) for t in (t_min, t_max)))
+        t_min, t_max = _each(t_min, n, "t_min"), _each(t_max, n, "t_max")
         ordered = t_min <= t_max
         apex = _apex(origins)
         ends = apex if apex else (origins.min(initial=0.0), origins.max(initial=0.0))
@@ -199,6 +199,14 @@ def taken(columns, index):
     for row, own in zip(columns, out):
         row.take(index, out=own, mode="clip")
     return out
+
+
+def _each(values, n, what):
+    """One number for all rays, or one for each."""
+    values = np.asarray(values, float)
+    if values.shape not in ((), (1,), (n,)):
+        raise ValueError(f"{what} is one number or one per ray, shape ({n},), not of shape {values.shape}.")
+    return values if values.ndim == 0 else np.broadcast_to(values, (n,))
 
 
 def _columns(points, what):

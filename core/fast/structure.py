@@ -6,6 +6,7 @@ from functools import partial
 
 import numpy as np
 
+from ..errors import ParameterError
 from ..hits import Cells, Hits
 from .primitives import Primitives
 from .query import Closest, Counts, Occluded
@@ -101,6 +102,28 @@ class Structure:
     def for_light(self, light):
         """The structure to ask about shadow rays to one of the scene's lights: this one, unless it keeps something for each."""
         return self
+
+    def refit(self, scene):
+        """Follow motion, where the technique can.
+
+        Parameters
+        ----------
+        scene : Scene
+            The scene it was built over, with other matrices or vertices.
+
+        Returns
+        -------
+        dict
+            The figures after it.
+
+        Raises
+        ------
+        SceneError
+            When it has other primitives than before.
+        ParameterError
+            When the technique does not follow motion.
+        """
+        raise ParameterError(f"{self.technique.name} does not follow motion: build it over the scene anew.")
 
     def cells(self):
         """The structure's boxes.

@@ -3,6 +3,10 @@
 import math
 from dataclasses import dataclass
 
+from ..errors import SceneError
+
+KINDS, SHAPES = ("point", "sun", "spot", "area"), ("rectangle", "ellipse")
+
 
 @dataclass
 class Light:
@@ -31,9 +35,15 @@ class Light:
     axes : tuple of two triples, optional
         Area: the half-edges of the rectangle, or half-axes of the ellipse, world space.
     shape : {"rectangle", "ellipse"}
+        Area.
     falloff : bool
         False: intensity does not decrease with distance (NFF lights).
     shadows : bool
+
+    Raises
+    ------
+    SceneError
+        For an unknown kind or shape.
     """
 
     name: str
@@ -48,6 +58,11 @@ class Light:
     shape: str = "rectangle"
     falloff: bool = True
     shadows: bool = True
+
+    def __post_init__(self):
+        for what, value, known in (("kind", self.kind, KINDS), ("shape", self.shape, SHAPES)):
+            if value not in known:
+                raise SceneError(f"{self.name or 'Light'}: its {what} is one of {', '.join(known)}, not {value!r}.")
 
     @property
     def has_extent(self):

@@ -90,6 +90,9 @@ class Shapes:
     name: str = "Shapes"
 
     def __post_init__(self):
+        for k, s in enumerate(self.solids):
+            if not hasattr(s, "kind"):
+                raise SceneError(f"{self.name}: solid {k} is {s!r}; solids are made by rayscope.core.solids.")
         smooth = [k for k, s in enumerate(self.solids) if getattr(s, "kind", "") == "triangle" and "normals" in s.values]
         self.corner_normals = np.zeros((len(self.solids), 3, 3), np.float32) if smooth else None
         for k in smooth:

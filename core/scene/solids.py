@@ -208,6 +208,17 @@ def mesh(geometry, matrix=None, **more):
     return Solid("mesh", _IDENTITY.copy() if matrix is None else matrix, values={"mesh": geometry}, **more)
 
 
+def _place(what, name, point):
+    """Three numbers."""
+    try:
+        place = np.asarray(point, float)
+    except (TypeError, ValueError):
+        place = None
+    if place is None or place.shape != (3,):
+        raise SceneError(f"{what}: its {name} is three numbers, not {point!r}.")
+    return place
+
+
 def sphere(centre, radius, **more):
     """A sphere.
 
@@ -223,7 +234,7 @@ def sphere(centre, radius, **more):
     -------
     Solid
     """
-    return Solid("sphere", _columns((radius, 0, 0), (0, radius, 0), (0, 0, radius), centre), **more)
+    return Solid("sphere", _columns((radius, 0, 0), (0, radius, 0), (0, 0, radius), _place("sphere", "centre", centre)), **more)
 
 
 def box(lo, hi, **more):
@@ -240,7 +251,7 @@ def box(lo, hi, **more):
     -------
     Solid
     """
-    lo, hi = np.asarray(lo, float), np.asarray(hi, float)
+    lo, hi = _place("box", "low corner", lo), _place("box", "high corner", hi)
     half = 0.5 * hi - 0.5 * lo
     return Solid("box", _columns((half[0], 0, 0), (0, half[1], 0), (0, 0, half[2]), 0.5 * lo + 0.5 * hi), **more)
 
@@ -303,7 +314,7 @@ def pyramid(lo, hi, **more):
     -------
     Solid
     """
-    lo, hi = np.asarray(lo, float), np.asarray(hi, float)
+    lo, hi = _place("pyramid", "low corner", lo), _place("pyramid", "high corner", hi)
     half, middle = 0.5 * hi - 0.5 * lo, 0.5 * lo + 0.5 * hi
     return Solid("pyramid", _columns((half[0], 0, 0), (0, half[1], 0), (0, 0, hi[2] - lo[2]), (middle[0], middle[1], lo[2])), **more)
 
@@ -377,7 +388,8 @@ def _columns(x, y, z, origin):
 
 def _about_axis(base, apex, radius):
     """Matrix that takes z from 0 to 1 onto an axis, and the unit circle onto one of a radius square to it."""
-    axis = [float(b) - float(a) for a, b in zip(base, apex)]
+    base, apex = _place("solid about an axis", "base", base).tolist(), _place("solid about an axis", "apex", apex).tolist()
+    axis = [b - a for a, b in zip(base, apex)]
     length = math.hypot(*axis)
     x, y, z = (v / length for v in axis) if length > 0.0 else (0.0, 0.0, 1.0)
     # Duff et al. 2017: an orthonormal basis without a branch that could fail.

@@ -3,7 +3,7 @@ import math
 
 import numpy as np
 import pytest
-from rayscope.core import Camera, Light, Scene, SceneError, build, solids, trace
+from rayscope.core import Camera, Light, ParameterError, Scene, SceneError, build, solids, trace
 from rayscope.core.scene.layout import Layout, inverse, mirrors, object_bounds, to_world
 from rayscope.core.scene.scene import Mesh, Object, Shapes
 
@@ -22,6 +22,31 @@ CORNERS = [(0, 0, 0), (1, 0, 0), (0, 1, 0), (1, 1, 0)]
 def test_bad_arrays_are_refused(vertices, triangles, words):
     with pytest.raises(SceneError, match=words):
         Scene.from_triangles(vertices, triangles)
+
+
+@pytest.mark.parametrize("make, words", [
+    (lambda: Light("Lamp", "lamp", (1, 1, 1)), "Lamp: its kind is one of point, sun, spot, area, not 'lamp'"),
+    (lambda: Light("Lamp", "area", (1, 1, 1), shape="disc"), "Lamp: its shape is one of rectangle, ellipse"),
+    (lambda: Scene(solids=[solids.sphere((0, 0, 0), 1), 3]), "solid 1 is 3"),
+    (lambda: solids.box((0, 0), (1, 1)), "box: its low corner is three numbers"),
+    (lambda: solids.pyramid((0, 0, 0), 1), "pyramid: its high corner"),
+    (lambda: solids.sphere("origin", 1), "sphere: its centre is three numbers, not 'origin'"),
+    (lambda: solids.cylinder((0, 0, 0), (0, 1), 1), "its apex is three numbers"),
+])
+def test_bad_lights_and_solids_are_refused(make, words):
+    with pytest.raises(SceneError, match=words):
+        make()
+
+
+@pytest.mark.parametrize("core", ["pure", "fast"])
+def test_calls_of_an_index_that_cannot_be_answered(core):
+    index = build(Scene.from_triangles(CORNERS, [(0, 1, 2)]), "grid", core)
+    for limits in ({"t_min": [0.0, 0.0]}, {"t_max": [1.0, 1.0]}):
+        with pytest.raises(ValueError, match="is one number or one per ray"):
+            index.closest([(0, 0, 1)] * 3, [(0, 0, -1)] * 3, **limits)
+    assert len(index.closest([(0, 0, 1)] * 3, [(0, 0, -1)] * 3, t_max=[2.0]).t) == 3
+    with pytest.raises(ParameterError, match="grid does not follow motion"):
+        index.refit(index.scene)
 
 
 @pytest.mark.parametrize("core", ["pure", "fast"])
