@@ -16,13 +16,13 @@ START = 0.02
 GROWTH = 4
 #: Of rays that came, so many times as many are thought to come yet, if more came than were expected.
 LASTING = 0.5
+#: Heats of a trial: batches that each structure is asked.
+HEATS = 2
 #: Rays that each structure gets in the second heat of a trial, at least and at most; the first has an eighth of them.
 #: The second is for those that took no more than CLOSE times as long as the best in the first.
 LEAST, MOST, FIRST_HEAT, CLOSE = 512, 2048, 8, 4.0
 #: A structure on trial takes so many times as long as the leader, about: what a trial will cost.
 SLOWER = 2.0
-#: Batches that a structure is asked in a trial.
-ASKED = 3
 #: Neighbouring rays that go to the same structure in a trial: as many as are traced well together.
 BLOCK = 64
 #: Rays that a new structure is asked before its trial: some techniques make their lists when the first rays come.
@@ -43,7 +43,7 @@ class Contest:
     structure : Structure
         Answers until there is a trial.
     others : list of (callable, float)
-        What builds another one, and the seconds that this is thought to take.
+        What builds another one, and the seconds that this and its trial are thought to take, however few the rays.
     expected : int
         Rays that will come, about.
     """
@@ -51,7 +51,6 @@ class Contest:
     def __init__(self, structure, others, expected):
         self.structures, self.others, self.expected = [structure], list(others), expected
         self.seen, self.seconds, self.spent, self._due = 0, 0.0, 0.0, START
-        self._small, self._large = (np.inf, 0.0), (0, 0.0)  # batches: rays, seconds
         self.batch, self.ray = [0.0], [0.0]
         self._own = {}
 
@@ -76,8 +75,9 @@ class Contest:
         return [notice for structure in self.structures for notice in structure.notices]
 
     def for_light(self, light):
-        """The same contest, about shadow rays to a light: for these some have a structure of its own."""
-        return OneLight(self, light)
+        """The contest about shadow rays to a light, the same for all unless the first keeps something for each."""
+        first = self.structures[0]
+        return self if first.for_light(light) is first else OneLight(self, light)
 
     def asked(self, number, light):
         """The structure of this number, or what it has for a light."""
@@ -142,24 +142,16 @@ class Contest:
         answers.append(ask(self.asked(self._quickest(n), light), slice(done, n) if done else slice(None)))
         took = time.thread_time() - start
         self.seen, self.seconds = self.seen + n, self.seconds + took
-        self._small, self._large = min(self._small, (n, took)), max(self._large, (n, took))
         if not done:
             return answers, None
         return answers, np.argsort(np.concatenate([*parts, np.arange(done, n)]))
-
-    def _batch(self):
-        """Seconds of a batch however few its rays, as far as the least and the greatest so far tell."""
-        (few, less), (many, more) = self._small, self._large
-        return max(less - few * max(more - less, 0.0) / (many - few), 0.0) if many >= 2 * few else 0.0
 
     def _entered(self, n):
         """Who takes part in a trial among n rays: what is to be built for it, and how many rays each gets at last."""
         ray = self.seconds / self.seen
         left = SHARE * ray * max(self.expected - self.seen, LASTING * self.seen) - self.spent
-        # Few rays may take as long as many.
-        own = SLOWER * LEAST * ray + ASKED * self._batch()
-        left -= own * (len(self.structures) - 1)
-        pays = []
+        own, pays = SLOWER * LEAST * ray, []
+        left -= own * (len(self.structures) - 1) + HEATS * sum(self.batch)
         for other in self.others:
             if other[1] + own <= left:
                 pays.append(other)

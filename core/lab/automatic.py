@@ -46,7 +46,7 @@ def against_fixed(scene, size=(240, 180), core="fast", choices=None, repeats=3):
         scene, choice; automatic, best, bvh: the least seconds of the processor, for everything; best_technique;
         over_best, over_bvh: automatic over each, minus 1, the median of the turns; range: of over_best among them.
     """
-    calibration(core, math.inf)  # all of it, as any user has it in the end
+    calibration(core)  # as any user has it in the end
     fixed = {_label(choice): choice for choice in ({}, *(_choices(core) if choices is None else choices))}
     for choice in fixed.values():  # importing is not tracing
         _traced(lit(triangles(20)), choice, core, (4, 4))

@@ -1,9 +1,10 @@
 """Which technique for each kind of ray, by what the models say of a scene; and what else may be quicker."""
 
 import itertools
+from operator import itemgetter
 
-from ...catalogue import technique
-from ...contest import SHARE
+from ...catalogue import ALL_RAYS, technique
+from ...contest import HEATS, SHARE
 from ...options import STANDARD
 from .calibrated import calibration, candidates
 from .glance import Glance, glance
@@ -12,15 +13,13 @@ from .tests import tests_of
 
 #: Rays that are traced together, about, as the tracers have it.
 WAVE = 65_536
-#: The whole picture must be faster than with the standard technique by this part, as the model is not exact.
+#: All that is asked must be answered faster than by the standard technique by this part, as the model is not exact.
 MARGIN = 0.05
 #: And for a kind of ray by this factor.
 SURE = 0.8
 #: What the model has no more than DOUBT times as slow as the choice may be tried while the picture is traced: so many
-#: OTHERS for a kind of ray, at most.
-DOUBT, OTHERS = 8.0, 2
-#: What a trial takes, at least. Seconds.
-SHORT = 0.01
+#: OTHERS for a kind of ray, at most. What keeps lists for each light is not: it would have to be asked light by light.
+DOUBT, OTHERS = 4.0, 2
 #: Share of the lights that shine on the side that is seen, about: no others are asked for.
 FACING = 2.0 / 3.0
 #: Reflections of reflections that count, and the share of the picture that a glance may miss.
@@ -46,8 +45,9 @@ def choose(seen, rays, core="fast", calls=None, tests=None):
     choice : dict
         Kind of ray -> name.
     rows : list of dict
-        What each candidate would take: technique, T_B, and per kind that it serves N_IT, N_TS and seconds for all rays;
-        s: in all, with STANDARD for the other kinds.
+        What each candidate would take: technique, T_B, lights: whether it keeps lists for each, call: seconds of a
+        batch however few its rays, and per kind that it serves N_IT, N_TS and seconds for all rays; s: in all, with
+        STANDARD for the other kinds.
     """
     models = candidates(core)
     triangles = calibration(core)[0]["brute"].wave if tests else 0.0
@@ -61,14 +61,24 @@ def choose(seen, rays, core="fast", calls=None, tests=None):
             cost[n, k] for n, k in zip(combination, rays)
         )
 
+    def per_ray(name, kind):
+        if technique(name).rays == ALL_RAYS:
+            return models[name].per_ray(kind, seen.measures, tests)
+        # Inside an instance it is STANDARD that goes on.
+        own = models[name].per_ray(kind, seen.outer, tests)
+        whole, outer = (models[STANDARD].per_ray(kind, some, tests) for some in (seen.measures, seen.outer))
+        return tuple(a + b - c for a, b, c in zip(own, whole, outer))
+
     for name, model in sorted(models.items(), key=lambda item: item[0] != STANDARD):
         row = {"technique": name, "T_B": seen.build if name == STANDARD and seen.build else builds[name]}
+        row |= {"lights": model.lights, "call": model.per_batch(tests, triangles)}
+        batches = max(len(seen.lights), 1) if model.lights else 1  # for each that there would be otherwise
         for kind, number in rays.items():
             if name in serve[kind]:
-                n_it, n_ts, seconds = model.per_ray(kind, seen.measures, tests)
-                cost[name, kind] = seconds * number + model.per_batch(tests, triangles) * calls[kind]
+                n_it, n_ts, seconds = per_ray(name, kind)
+                cost[name, kind] = seconds * number + row["call"] * calls[kind] * batches
                 row |= {f"N_IT {kind}": n_it, f"N_TS {kind}": n_ts, f"s {kind}": cost[name, kind]}
-        if len(row) > 2:
+        if len(row) > 4:
             row["s"] = total([name if name in serve[kind] else STANDARD for kind in rays])
             rows.append(row)
     standard = (STANDARD,) * len(rays)
@@ -78,8 +88,7 @@ def choose(seen, rays, core="fast", calls=None, tests=None):
         for kind, names in serve.items()
     }
     best = min(itertools.product(*serve.values()), key=total) if rays else ()
-    besides = models[STANDARD].shading * sum(rays.values())  # which no choice saves
-    if rays and total(best) + besides > (1.0 - MARGIN) * (total(standard) + besides):
+    if rays and total(best) > (1.0 - MARGIN) * total(standard):
         best = standard
     return dict(zip(rays, best)), sorted(rows, key=lambda row: row["s"])
 
@@ -115,12 +124,12 @@ def expected_rays(seen, pixels, samples=1, depth=5, looked=None):
 
 
 def expected_calls(seen, rays, depth=5):
-    """Kind of ray -> number of batches: a reflection is traced after what it is seen in, lights one by one."""
+    """Kind of ray -> number of batches: a reflection is traced after what it is seen in, its shadow rays with it."""
     waves = {kind: 1 + number // WAVE for kind, number in rays.items()}
     secondary = max(waves.get("secondary", 0), depth if "secondary" in rays else 0)
     return waves | {
         "secondary": secondary,
-        "shadow": max(waves.get("shadow", 0), (waves["primary"] + secondary) * len(seen.lights)),
+        "shadow": max(waves.get("shadow", 0), waves["primary"] + secondary),
     }
 
 
@@ -130,7 +139,7 @@ def resolve_automatic(scene, index, size, samples, depth, core, kinds):
     Returns
     -------
     dict
-        Kind of ray -> (name, seconds to build it): the choice, and what may be quicker; and the rays expected.
+        Kind of ray -> (name, seconds to try it): the choice, and what may be quicker; and the rays expected.
     """
     seen = survey(scene, index)
     rays = expected_rays(seen, size[0] * size[1], samples, depth, glance(scene, index))
@@ -151,19 +160,20 @@ def contenders(choice, rows):
     Returns
     -------
     dict
-        Kind of ray -> list of (name, seconds to build it): the choice, then others, the quickest first; STANDARD is
-        there already.
+        Kind of ray -> list of (name, seconds to try it, all that a trial takes however few its rays): the choice, then
+        others, the quickest first.
     """
     of, found = {row["technique"]: row for row in rows}, {}
     for kind, name in choice.items():
-        key = f"s {kind}"
-        own = [row for row in rows if key in row and row[key] <= DOUBT * of[name][key] and row is not of[name]]
-        builds = {row["technique"]: 0.0 if row["technique"] == STANDARD else row["T_B"] for row in (of[name], *own)}
-        # What would take too long to build will not be tried.
-        own = [
-            row
-            for row in sorted(own, key=lambda row: row[key])
-            if builds[row["technique"]] + SHORT <= SHARE * DOUBT * of[name][key]
-        ]
-        found[kind] = [(row["technique"], builds[row["technique"]]) for row in (of[name], *own[:OTHERS])]
+        key, chosen = f"s {kind}", of[name]
+
+        def trial(row, chosen=chosen):
+            build = 0.0 if row["technique"] == STANDARD else row["T_B"]  # which is there already
+            return build + (HEATS + 1) * row["call"] + HEATS * chosen["call"]
+
+        own = [row for row in rows if key in row and row is not chosen and not row["lights"]]
+        # What is far slower will not be tried, nor what would take too long.
+        own = [row for row in own if row[key] <= DOUBT * chosen[key] and trial(row) <= SHARE * DOUBT * chosen[key]]
+        own.sort(key=itemgetter(key))
+        found[kind] = [(name, 0.0), *((row["technique"], trial(row)) for row in own[:OTHERS])]
     return found

@@ -38,9 +38,9 @@ def glance(scene, index):
     Returns
     -------
     Glance or None
-        None without a camera.
+        None without a camera, and where nothing sends rays on: then there is little to be learnt.
     """
-    if scene.camera is None:
+    if scene.camera is None or not any(m.reflects or m.transparent for m in scene.used_materials()):
         return None
     rays = pixel_rays(scene.camera, PIXELS)
     hits = index.closest(rays.origins.tolist(), rays.directions.tolist(), rays.t_min, rays.t_max)

@@ -51,7 +51,7 @@ def _model(row):
         }
     )
     model.build_seconds(1)  # a file that somebody wrote into is noticed here
-    model.ns[0] + model.ns[1] + model.ns[2] + model.shading + model.wave + model.off
+    model.ns[0] + model.ns[1] + model.ns[2] + model.wave + model.off
     return model
 
 

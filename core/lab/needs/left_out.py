@@ -10,7 +10,7 @@ import numpy as np
 from ...catalogue import technique, techniques
 from ...options import STANDARD
 from ..estimate import duration, estimate
-from .calibrated import CALIBRATED, ROUGH, calibration, rough
+from .calibrated import ROUGH, calibration, rough
 
 #: Bytes of a triangle in a structure, about: what copies of instances would take.
 TRIANGLE_BYTES = 250
@@ -184,8 +184,6 @@ def _others(scene, seen, tests, rays, rows, core, size, samples, depth):
             continue
         if row.name in models:
             why = f"its time does not follow from its counters: the model was off by a factor of {model.off:.2g}"
-        elif row.name in CALIBRATED[core]:
-            why = "calibrating, which takes no more than a second, did not come to it yet"
         else:
             why = "it was hardly ever the quickest where pictures were measured: no candidate, and fitted roughly"
         seconds = sum(model.per_ray(kind, seen.measures, tests)[2] * rays[kind] for kind in served)

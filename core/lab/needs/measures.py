@@ -75,6 +75,8 @@ class Survey:
     n : int
         Primitives that a structure is built over at the top level, with those inside shared meshes.
     measures : Measures
+    outer : Measures
+        Of the top level alone: an instance is one of its primitives.
     kinds : dict
         Kind of primitive -> number.
     copied : int
@@ -91,6 +93,7 @@ class Survey:
 
     n: int
     measures: Measures
+    outer: Measures
     kinds: dict
     copied: int
     mirrors: list
@@ -121,9 +124,10 @@ def survey(scene, index=None):
     index = build(scene, STANDARD) if index is None else index
     began = time.perf_counter()
     kinds, meshes = _contents(index)
-    measures, lo, hi = _measured_boxes(index)
+    outer, lo, hi = _measured_boxes(index)
+    measures = outer
     if meshes:
-        measures = measures.inside(_mean([_measured_boxes(mesh)[0] for mesh, _ in meshes.most_common(MESHES)]))
+        measures = outer.inside(_mean([_measured_boxes(mesh)[0] for mesh, _ in meshes.most_common(MESHES)]))
     inner = sum(mesh.figures["N"] for mesh in meshes)
     kinds["triangle"] += inner
     materials = scene.used_materials()
@@ -131,6 +135,7 @@ def survey(scene, index=None):
     return Survey(
         index.figures["N"] + inner,
         measures,
+        outer,
         {k: v for k, v in kinds.items() if v},
         sum(mesh.figures["N"] * number for mesh, number in meshes.items()) - inner,
         [m.name for m in materials if m.mirror or m.mirror_base],
