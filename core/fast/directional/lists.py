@@ -281,8 +281,10 @@ class Lists:
         cell = np.flatnonzero(foot_of[proposed] >= 0)
         foot = foot_of[proposed[cell]]
         u, v = grid.centres()
-        low = Covers.of(self.view, primitives, feet.item[foot]).least(np.arange(len(foot)), u[cell], v[cell], grid.half_u, grid.half_v)
-        high = nearness_in(feet, foot, u[cell], v[cell], grid.half_u, grid.half_v)
+        some, which = np.unique(foot, return_inverse=True)
+        covers = Covers.of(self.view, primitives, feet.item[some])
+        low, beside = (f(which, u[cell], v[cell], grid.half_u, grid.half_v) for f in (covers.least, covers.beside))
+        high = np.maximum(nearness_in(feet, foot, u[cell], v[cell], grid.half_u, grid.half_v), beside)
         sure = np.flatnonzero((low > -np.inf) & occludes(low, high))
         hidden = np.full(len(u), -np.inf)
         hidden[cell[sure]], self.covered[cell[sure]] = low[sure], foot[sure]

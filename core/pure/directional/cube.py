@@ -28,8 +28,7 @@ class Cube:
             axis, back = divmod(number, 2)
             forward = tuple(-c if back else c for c in AXES[axis])
             view = View(self.position, AXES[(axis + 1) % 3], AXES[(axis + 2) % 3], forward, extra=self.extra)
-            footprints = [f for f in (view.footprint(i, p) for i, p in enumerate(self.primitives)) if f is not None]
-            self.faces[number] = view, self.divide(footprints, _ends)
+            self.faces[number] = view, self.divide(view.footprints(self.primitives), _ends)
         return self.faces[number]
 
     @staticmethod

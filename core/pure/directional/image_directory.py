@@ -25,14 +25,7 @@ class ImageDirectory(Handing):
             self.notices.append(self.needs("a camera", "Add one, or name another technique for primary rays."))
             return
         self.near = float(camera.near)
-        footprints = []
-        for item, primitive in enumerate(self.primitives):
-            footprint = self.view.footprint(item, primitive)
-            if footprint is not None:
-                footprints.append(footprint)
-            if not item & 255:
-                progress(item / len(self.primitives))
-        self.root = divide(footprints, self._occludes)
+        self.root = divide(self.view.footprints(self.primitives, progress), self._occludes)
         cells = list(self.root.walk())
         leaves = [c for c in cells if not c.children]
         self.figures.update(N_G=len(cells) - len(leaves), N_E=len(leaves), N_EE=sum(not c.entries for c in leaves),

@@ -217,8 +217,7 @@ class _Sun:
     def windows(self):
         """View and cells, in a list."""
         if not self.faces and self.view.usable:
-            footprints = [f for f in (self.view.footprint(i, p) for i, p in enumerate(self.primitives)) if f is not None]
-            self.faces[0] = self.view, self.divide(footprints)
+            self.faces[0] = self.view, self.divide(self.view.footprints(self.primitives))
         return list(self.faces.values())
 
     def place(self, ray):

@@ -129,9 +129,11 @@ def _seen(cell, footprints, propose, occludes):
     wide = (u_lo - grow, u_hi + grow, v_lo - grow, v_hi + grow)
     there = [(f, *f.nearness(wide)) for f in footprints if f.reaches(wide)]
     hidden_below = -math.inf
-    for f, low, high in propose(wide, there):
-        if low > hidden_below and f.covers(wide) and occludes(f, low, high):
-            hidden_below, cell.covered = low, f.item
+    for f, low, _ in propose(wide, there):
+        if low > hidden_below and f.covers(wide):
+            low, high = f.span(wide)
+            if low > hidden_below and occludes(f, low, high):
+                hidden_below, cell.covered = low, f.item
     return [entry for entry in there if entry[2] >= hidden_below]
 
 

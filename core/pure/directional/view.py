@@ -12,6 +12,7 @@ import itertools
 import math
 
 from ...vectors import cross, dot
+from ..structure import no_progress
 
 #: Rounding of the corners and of the rays, relative to the largest number involved.
 ROUNDING = 2.0**-42
@@ -82,6 +83,22 @@ class View:
         x, y, z = self.direction([a - b for a, b in zip(p, self.position)])
         return x - self.shift[0], y - self.shift[1], z
 
+    def footprints(self, primitives, progress=no_progress):
+        """Where primitives are seen, those that the window shows; triangles that are a face together share their outline."""
+        found = []
+        for item, primitive in enumerate(primitives):
+            found.append(self.footprint(item, primitive))
+            if not item & 255:
+                progress(item / len(primitives))
+        for item, footprint in enumerate(found):
+            for beside in (item + 1, item - 1):
+                if footprint is None or not footprint.edges or not 0 <= beside < len(found) or found[beside] is None or not found[beside].edges:
+                    continue
+                corners = opposite(primitives[item], primitives[beside])
+                if corners is not None and footprint.join(found[beside], *corners):
+                    break
+        return [footprint for footprint in found if footprint is not None]
+
     def footprint(self, item, primitive):
         """Where a primitive is seen, or None where the window does not show it."""
         if primitive.KIND == "triangle":
@@ -133,13 +150,18 @@ class Footprint:
         Where a u + b v + c > 0 for all of them, the primitive certainly is. Empty where nothing is sure.
     farthest : float
         Nearness there, at least, where there is no plane.
+    corners : list of (x, y, w)
+        Of a triangle, as it is seen; each edge has the number of the corner opposite.
+    beside : Footprint, or None
+        Of a neighbour that shares `within`.
     """
 
-    __slots__ = ("item", "bounds", "nearest", "error", "edges", "slack", "plane", "loose", "within", "farthest")
+    __slots__ = ("item", "bounds", "nearest", "error", "edges", "slack", "plane", "loose", "within", "farthest", "corners", "beside")
 
     def __init__(self, item, bounds, nearest, error):
         self.item, self.bounds, self.nearest, self.error = item, bounds, nearest, error
         self.edges, self.slack, self.plane, self.loose, self.within, self.farthest = (), 0.0, None, 0.0, (), -math.inf
+        self.corners, self.beside = (), None
 
     def add_edges(self, points, perspective):
         """Edges and plane of a triangle: the rows of the inverse of the matrix of its corners (Olano and Greer 1997)."""
@@ -154,10 +176,37 @@ class Footprint:
         sign = math.copysign(1.0, det)
         self.edges = [tuple(sign * c for c in n) for n in normals]
         self.slack = slack
-        self.within = [(a, b, c - slack) for a, b, c in self.edges]
+        self.corners = corners
+        self.within = self._inner(0, 1, 2)
         self.plane = tuple(sum(w * n[k] for w, n in zip(weight, normals)) / det for k in range(3))
         total = sum(map(abs, self.plane))
         self.loose = 4.0 * slack * (max(map(abs, weight)) + size * total) / abs(det) + LOSS * total + 2.0 * self.error * (not perspective)
+
+    def join(self, other, i, j):
+        """Share the outline with a neighbour if both are convex together; whether they are.
+
+        Parameters
+        ----------
+        other : Footprint
+            Of a triangle that has an edge in common with this one.
+        i, j : int
+            The corner of each that the other has not.
+        """
+        mine, its = self.corners[i], other.corners[j]
+        size = max(abs(c) for p in (*self.corners, its) for c in p)
+        across, = self._inner(i)
+        own, others = self._inner((i + 1) % 3, (i + 2) % 3), other._inner((j + 1) % 3, (j + 2) % 3)
+        # It lies across the edge that is shared, and each within the other's edges.
+        if not dot(across, its) < -4.0 * (self.slack + other.slack) * size:
+            return False
+        if not all(dot(edge, its) >= 0.0 for edge in own) or not all(dot(edge, mine) >= 0.0 for edge in others):
+            return False
+        self.within, self.beside = own + others, other
+        return True
+
+    def _inner(self, *which):
+        """Some edges, moved inwards by what may be rounded."""
+        return [(a, b, c - self.slack) for a, b, c in (self.edges[k] for k in which)]
 
     def add_outline(self, points, perspective):
         """Edges within a primitive, and its farthest nearness, from the corners of a box inscribed in it."""
@@ -195,6 +244,24 @@ class Footprint:
         low = a * cell[a < 0.0] + b * cell[2 + (b < 0.0)] + c - self.loose
         high = a * cell[a >= 0.0] + b * cell[2 + (b >= 0.0)] + c + self.loose
         return low, min(high, self.nearest)
+
+    def span(self, cell):
+        """Least and greatest nearness in a cell, at most, of all that shares the outline."""
+        low, high = self.nearness(cell)
+        if self.beside is None:
+            return low, high
+        its_low, its_high = self.beside.nearness(cell)
+        return min(low, its_low), max(high, its_high)
+
+
+def opposite(p, q):
+    """The corners that two triangles of an object do not share, if they share just two: a number of each; or None."""
+    if p.KIND != "triangle" or q.KIND != "triangle" or p.object != q.object:
+        return None
+    mine, its = (p.a, p.b, p.c), (q.a, q.b, q.c)
+    if len({*mine, *its}) != 4 or len({*mine}) != 3 or len({*its}) != 3:
+        return None
+    return next(k for k in range(3) if mine[k] not in its), next(k for k in range(3) if its[k] not in mine)
 
 
 def _bounds(points, e):
