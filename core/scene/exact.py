@@ -17,6 +17,8 @@ DOUBTFUL = 2.0**-16
 ALLOWED = 8.0
 #: By how much of its distance rounding moves a vertex sideways, as the watertight test sees it: at most.
 SEEN = 2.0**-50
+#: A polygon's t is not where it is seen if the sine of the angle between ray and plane is smaller.
+GRAZING = 2.0**-12
 #: Dekker's factor: splits 53 bits into 26 and 27.
 SPLIT = 2.0**27 + 1.0
 
@@ -84,6 +86,35 @@ def stretch(x, y, t, far):
             ends = begin + first * (end - begin), begin + last * (end - begin)
             low, high = min(low, *ends), max(high, *ends)
     return low, high
+
+
+def on_polygon(points, sz, t):
+    """Where a ray within a polygon's plane, all but for rounding, passes it: the t there that is nearest to a given one.
+
+    Parameters
+    ----------
+    points : sequence of 3 float
+        The corners, sheared: the ray runs through (0, 0); and how far they are along its main axis.
+    sz : float
+        t by that distance.
+    t : float
+        Where the ray crosses the plane, as far as that can be told.
+    """
+    x, y, z = zip(*points)
+    s = x if max(x) - min(x) >= max(y) - min(y) else y
+    slack = SEEN * max(map(abs, z))
+    parts, crossed = [], []
+    for i in range(len(s)):
+        begin, end, span = z[i - 1] * sz, z[i] * sz, s[i] - s[i - 1]
+        low, high = stretch((s[i - 1], s[i], s[i]), (0.0, 0.0, 0.0), (begin, end, end), slack / SEEN)
+        if low <= high:
+            parts.append((low, high))
+        if (s[i - 1] > 0.0) != (s[i] > 0.0):
+            crossed.append(begin - s[i - 1] / span * (end - begin))
+    crossed.sort()
+    parts += zip(crossed[::2], crossed[1::2])
+    low, high = min(parts, key=lambda part: max(part[0] - t, t - part[1], 0.0), default=(t, t))
+    return min(max(t, low), high)
 
 
 def refined(o, d, corners, t, low, high, deep):

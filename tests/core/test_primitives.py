@@ -595,3 +595,34 @@ def test_inscribed_boxes_lie_within(name):
         assert all(CLOSED[name][1](*back(exact(p))) <= slack for p in corners)
         edges = corners[[1, 2, 4]] - corners[0]
         assert abs(np.linalg.det(edges)) > 0.29 * abs(np.linalg.det(matrix[:3, :3]))
+
+
+@pytest.mark.parametrize("core", ["pure", "fast"])
+def test_a_ray_in_the_plane_of_a_polygon_is_said_to_meet_it_where_it_is(core):
+    """All but for rounding: where the line crosses the plane may be anywhere; polygons of few corners, of many, and such as are not convex."""
+    rng, checked = np.random.default_rng(12), 0
+    for m in (4, 9, 40):
+        around, radius = np.sort(rng.random(m)) * math.tau, np.where(np.arange(m) % 2, 0.4, 1.0)
+        x, y = radius * np.cos(around) + 100.0, radius * np.sin(around)
+        corners = np.stack([x, y, 0.3 * x + 0.7 * y], axis=1)
+        scene = Scene(solids=[solids.polygon(corners)])
+        a, b = (rng.dirichlet(np.ones(m), 60) @ corners for _ in range(2))
+        d = b - a
+        o = a - rng.choice([0.5, 1.0, 3.0], 60)[:, None] * d
+        hits, tree = (build(scene, name, core).closest(o, d) for name in ("brute", "kd-tree"))
+        assert np.array_equal(hits.t, tree.t)
+        t = np.asarray(hits.t)
+        met = np.isfinite(t)
+        at = o[met] + t[met, None] * d[met]
+        off = np.maximum(corners.min(axis=0) - at, at - corners.max(axis=0)).max(axis=1)
+        assert off.max() <= 16.0 * 2.0**-52 * np.abs(o).max()
+        checked += len(at)
+    assert checked > 60
+
+
+def test_the_nearest_place_on_a_polygon_seen_edge_on():
+    """A comb seen along its teeth: between them there is nothing, and what is beside them all goes to the end."""
+    from rayscope.core.scene.exact import on_polygon
+    comb = [(-1.0, 0.0, 1.0), (1.0, 0.0, 1.0), (1.0, 0.0, 2.0), (-1.0, 0.0, 2.0), (-1.0, 0.0, 3.0), (1.0, 0.0, 3.0), (1.0, 0.0, 4.0), (-1.5, 0.0, 4.0), (-1.5, 0.0, 1.0)]
+    for t, place in ((-5.0, 1.0), (1.25, 1.25), (2.4, 2.0), (2.6, 3.0), (3.5, 3.5), (9.0, 4.0)):
+        assert on_polygon(comb, 1.0, t) == pytest.approx(place, abs=1e-12)

@@ -10,6 +10,7 @@ near to an edge that rounding matters are decided by the full test, so both give
 
 import numpy as np
 
+from ...scene.exact import GRAZING, on_polygon
 from ...scene.placed import Corners
 from .solids import EPSILON, dot
 from .triangle import TRIM, Triangles
@@ -90,18 +91,35 @@ class Polygons:
         n = [normal[a].take(item) for a in range(3)]
         with np.errstate(all="ignore"):
             away = dot(n, [anchor[a].take(item) - o[a].take(ray) for a in range(3)])
-            t = away / dot(n, [d[a].take(ray) for a in range(3)])
-        pair = np.flatnonzero((t >= rays.t_min.take(ray)) & (t <= t_far.take(ray)) & (np.abs(t) < np.inf))
-        own_ray, own = ray[pair], item[pair]
+            slope = dot(n, [d[a].take(ray) for a in range(3)])
+            t, edge_on = away / slope, np.abs(slope) < GRAZING
+        t_min, t_far = rays.t_min.take(ray), t_far.take(ray)
+        pair = np.flatnonzero(((t >= t_min) & (t <= t_far) | edge_on) & (np.abs(t) < np.inf))
+        own_ray, own, edge_on = ray[pair], item[pair], edge_on[pair]
         inside = np.zeros(len(pair), bool)
         open_ = np.arange(len(pair))
         if self._bands:
-            large = np.flatnonzero(np.diff(self.corners.start)[own] > MANY)
+            many = (np.diff(self.corners.start)[own] > MANY) & ~edge_on
+            large = np.flatnonzero(many)
             inside[large], doubtful = self._bands.inside(o[:, own_ray[large]], d[:, own_ray[large]], t[pair[large]], own[large])
-            open_ = np.concatenate([np.flatnonzero(np.diff(self.corners.start)[own] <= MANY), large[doubtful]])
+            open_ = np.concatenate([np.flatnonzero(~many), large[doubtful]])
         inside[open_] = self._inside(*self._sheared(rays, own_ray[open_]), own[open_])
-        pair = pair[inside]
+        pair, edge_on = pair[inside], edge_on[inside]
+        if edge_on.any():
+            some = pair[edge_on]
+            t[some] = self._on_polygons(rays, ray[some], item[some], t[some])
+            pair = pair[(t[pair] >= t_min[pair]) & (t[pair] <= t_far[pair])]
         return pair, t[pair]
+
+    def _on_polygons(self, rays, ray, item, t):
+        """Where rays within the planes of polygons, all but for rounding, pass these: see :func:`~rayscope.core.scene.exact.on_polygon`."""
+        axes, origin, sx, sy = self._sheared(rays, ray)
+        found, sz = np.empty(len(t)), rays.shear[2][2].take(ray)
+        for k, i in enumerate(item.tolist()):
+            x, y, z = self.corners.xyz[axes[:, k], self.corners.start[i]:self.corners.start[i + 1]] - origin[:, k, None]
+            x, y = x - sx[k] * z, y - sy[k] * z
+            found[k] = on_polygon(np.stack([x, y, z], axis=1).tolist(), float(sz[k]), float(t[k]))
+        return found
 
     @staticmethod
     def _sheared(rays, ray):

@@ -6,11 +6,12 @@ import numpy as np
 
 from ...scene.scene import Scene
 from .rays import (aimed_inside, axis_rays, bad_rays, cube_rays, few, from_nowhere, from_the_gap, from_the_middle,
-                   fuzzy_rays, grazing, in_the_plane, mixed_rays, one_ray, starts,
+                   fuzzy_rays, grazing, in_planes_of_polygons, in_the_plane, mixed_rays, one_ray, starts,
                    to_lights, touching, window_rays, with_ends)
 from .scenes import (LOST, PBRT, blocks, copies, coplanar, corner_blocks, degenerate, far_vertex, fuzz, identical, lit,
                      moved_ball, nested_boxes, random_soup, room_of_solids, shapes,
-                     sheet, shells, slivers, solids_under_matrices, soup, spheres, stadium, star, tangent_spheres, tilted)
+                     sheet, shells, slivers, solids_under_matrices, soup, spheres, stadium, star, tangent_spheres, tilted,
+                     tilted_polygons)
 
 TRIANGLES = frozenset({"triangle"})
 
@@ -158,6 +159,8 @@ def cases(full=False):
         Case("random bits", fuzz, fuzzy_rays, exact=False, told=("Mesh",)),
         Case("seen edge-on", identical(30), in_the_plane),
         Case("in a tilted plane", tilted, in_the_plane),
+        Case("polygons in a tilted plane", tilted_polygons, in_planes_of_polygons, kinds=frozenset({"polygon", "triangle"}),
+             exact=False),
         Case("direction cube and blocks", blocks, cube_rays),
         Case("direction cube and ball", moved_ball(), cube_rays),
         Case("direction cube and solids", shapes, cube_rays,

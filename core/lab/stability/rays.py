@@ -248,6 +248,17 @@ def in_the_plane(scene, rng, n):
     return Batch(on - 3.0 * d, d)
 
 
+def in_planes_of_polygons(scene, rng, n):
+    """From point to point of polygons, beginning before, at and behind the first."""
+    some, o, d = [s.values["points"] for x in scene.objects for s in x.geometry.solids], [], []
+    for k in range(n):
+        points = some[rng.integers(len(some))]
+        one, other = rng.dirichlet(np.ones(len(points)), 2) @ points
+        d.append(other - one)
+        o.append(one - (3.0, 0.0, 0.5)[k % 3] * d[-1])
+    return Batch(np.array(o), np.array(d))
+
+
 def window_rays(scene, rng, n):
     """From the camera through the corners of the pixels of its picture, those of the window among them, and from
     elsewhere."""

@@ -132,6 +132,16 @@ def tilted(rng):
     return soup(np.stack([x, y, 0.3 * x + 0.7 * y], axis=-1))
 
 
+def tilted_polygons(rng):
+    """Polygons in such a plane, few of them convex."""
+    some = []
+    for count in (3, 4, 5, 7, 9, 20, 40):
+        around, radius = np.sort(rng.random(count)) * math.tau, np.where(np.arange(count) % 2, 0.4, 1.0)
+        x, y = radius * np.cos(around) + rng.normal(), radius * np.sin(around) + rng.normal()
+        some.append(solids.polygon(np.stack([x, y, 0.3 * x + 0.7 * y], axis=1)))
+    return Scene(solids=some)
+
+
 PBRT = (
     (-1113.45459, -79.049614, -56.2431908),
     (-1113.45459, -87.0922699, -56.2431908),

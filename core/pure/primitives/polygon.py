@@ -7,6 +7,7 @@ one ends. What lies exactly on an edge is hit.
 
 import math
 
+from ...scene.exact import GRAZING, on_polygon
 from ...scene.placed import Corners
 from ...vectors import dot
 from . import Primitive
@@ -34,6 +35,22 @@ def distance(p, q):
         s = clamp(divide(top, bottom), 0.0, 1.0)
         best = min(best, max(abs(x + s * e), abs(y + s * f)))
     return best
+
+
+def inside(sheared):
+    """Whether a line passes through a polygon, or through its edge; the corners as :meth:`Polygon.sheared` tells them."""
+    odd = False
+    x, y, _ = sheared[-1]
+    for x1, y1, _ in sheared:
+        side = x * y1 - x1 * y
+        if side == 0.0:
+            if min(x, x1) <= 0.0 <= max(x, x1) and min(y, y1) <= 0.0 <= max(y, y1):
+                return True
+        # An edge that crosses the positive x axis; each corner belongs to one of its two edges.
+        elif (y > 0.0) != (y1 > 0.0) and (side > 0.0) == (y1 > 0.0):
+            odd = not odd
+        x, y = x1, y1
+    return odd
 
 
 class ThreeCorners:
@@ -82,38 +99,32 @@ class Polygon(Primitive):
                 in enumerate(zip(corners.normal.T.tolist(), corners.anchor.T.tolist(), placed.object_of.tolist(), placed.primitive_of.tolist()))]
 
     def intersect(self, ray, t_far, watch=None):
-        away = dot(self.normal, [a - o for a, o in zip(self.anchor, ray.o)])
-        t = divide(away, dot(self.normal, ray.d))
-        if not (ray.t_min <= t <= t_far and math.isfinite(t)):
+        away, slope = dot(self.normal, [a - o for a, o in zip(self.anchor, ray.o)]), dot(self.normal, ray.d)
+        t, edge_on = divide(away, slope), abs(slope) < GRAZING
+        if not ((ray.t_min <= t <= t_far or edge_on) and math.isfinite(t)):
             return None
-        if not self.inside(ray.axes, [ray.o[axis] for axis in ray.axes], ray.shear[0], ray.shear[1]):
+        sheared = self.sheared(ray.axes, [ray.o[axis] for axis in ray.axes], ray.shear[0], ray.shear[1])
+        if not inside(sheared):
             return None
+        if edge_on:
+            t = on_polygon(sheared, ray.shear[2], t)
+            if not ray.t_min <= t <= t_far:
+                return None
         p = [o + t * d for o, d in zip(ray.o, ray.d)]
         u, v = ((p[axis] - self.lo[axis]) / (self.hi[axis] - self.lo[axis] or 1.0) for axis in self.axes[:2])
         return t, u, v, 0
 
-    def inside(self, axes, origin, sx, sy):
-        """Whether a line passes through the polygon, or through its edge.
+    def sheared(self, axes, origin, sx, sy):
+        """The corners, seen along a line, and how far they are along it.
 
         The line goes through `origin` (its coordinates in the order of `axes`) along the direction (sx, sy, 1).
         """
         kx, ky, kz = axes
-        sheared = []
+        found = []
         for p in self.corners:
             z = p[kz] - origin[2]
-            sheared.append(((p[kx] - origin[0]) - sx * z, (p[ky] - origin[1]) - sy * z))
-        odd = False
-        x, y = sheared[-1]
-        for x1, y1 in sheared:
-            side = x * y1 - x1 * y
-            if side == 0.0:
-                if min(x, x1) <= 0.0 <= max(x, x1) and min(y, y1) <= 0.0 <= max(y, y1):
-                    return True
-            # An edge that crosses the positive x axis; each corner belongs to one of its two edges.
-            elif (y > 0.0) != (y1 > 0.0) and (side > 0.0) == (y1 > 0.0):
-                odd = not odd
-            x, y = x1, y1
-        return odd
+            found.append(((p[kx] - origin[0]) - sx * z, (p[ky] - origin[1]) - sy * z, z))
+        return found
 
     def surface(self, ray, t, u, v, detail):
         p = [o + t * d for o, d in zip(ray.o, ray.d)]
@@ -216,5 +227,5 @@ class Polygon(Primitive):
                     point[b], point[c] = at_b, at_c
                     point[axis] = anchor[axis] - (n[b] * (at_b - anchor[b]) + n[c] * (at_c - anchor[c])) / n[axis]
                     # Looked at along the axis nearest to the normal.
-                    if lo[axis] <= point[axis] <= hi[axis] and self.inside(self.axes, [point[k] for k in self.axes], 0.0, 0.0):
+                    if lo[axis] <= point[axis] <= hi[axis] and inside(self.sheared(self.axes, [point[k] for k in self.axes], 0.0, 0.0)):
                         yield point
