@@ -11,7 +11,9 @@ OLDEST = (4, 5)
 
 
 def find_blender():
-    """(command, "") or (None, why not): $BLENDER, a `blender` on the PATH, or the one that `tools/blender-chroot --setup` made."""
+    """(command, "") or (None, why not): $BLENDER, a `blender` on the PATH,
+    or the one that `tools/blender-chroot --setup` made.
+    """
     if os.environ.get("BLENDER"):
         return _checked(shlex.split(os.environ["BLENDER"]))
     if shutil.which("blender") and _checked(["blender"])[0]:

@@ -70,7 +70,9 @@ def demo(file, out):
 
 
 def draw_structures(scene, image, out):
-    """overlay_NAME.png for each structure; nothing, and a line that says so, where this bpy cannot draw without a window."""
+    """overlay_NAME.png for each structure; nothing, and a line that says so,
+    where this bpy cannot draw without a window.
+    """
     try:
         import gpu
         with unheard():

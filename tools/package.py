@@ -1,7 +1,9 @@
-"""Build the extension into dist/: one plain zip, and per platform a release zip with the wheels of embreex and matplotlib.
+"""Build the extension into dist/: one plain zip, and per
+platform a release zip with the wheels of embreex and matplotlib.
 
-The plain zip runs wherever numpy does, so in every Blender. Blender refuses a zip with wheels if none of them is for its Python, therefore only
-release zips hold wheels, for each Python that a supported Blender has. Versions are those of uv.lock.
+The plain zip runs wherever numpy does, so in every Blender. Blender refuses a zip
+with wheels if none of them is for its Python, therefore only release zips hold
+wheels, for each Python that a supported Blender has. Versions are those of uv.lock.
 """
 import shutil
 import subprocess

@@ -1,7 +1,7 @@
 """Run the tests in every Blender there is, all parts even if one fails, and sum up: tools/test.py [PART ...]
 
-Parts: core (no bpy) · addon (bpy 5.2) · addon-4.5 (bpy 4.5 LTS) · blender (a real `blender -b`) · gui (a real window under Xvfb).
-The core, which takes as long as all others, runs beside them; each line says which part it is from.
+Parts: core (no bpy) · addon (bpy 5.2) · addon-4.5 (bpy 4.5 LTS) · blender (a real `blender -b`) · gui (a real window
+under Xvfb). The core, which takes as long as all others, runs beside them; each line says which part it is from.
 """
 import os
 import re
@@ -102,7 +102,8 @@ def run(name):
     print(f"#### {name}: {' '.join(command)}", flush=True)
     lines = []
     with tempfile.TemporaryDirectory(prefix="rayscope-user-") as user:
-        # Only a Blender that is started anew needs its folder from here; the bpy module's is made in tests/addon/conftest.py.
+        # Only a Blender that is started anew needs its folder from here;
+        # the bpy module's is made in tests/addon/conftest.py.
         fresh = {"BLENDER_USER_RESOURCES": user} if name == "blender" else {}
         process = subprocess.Popen(
             command, cwd=ROOT, env={**os.environ, **environment, **fresh}, text=True, errors="replace",

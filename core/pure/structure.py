@@ -15,7 +15,9 @@ from .watch import Counter
 
 @dataclass(slots=True)
 class Hit:
-    """The nearest hit of one ray; fields as in :class:`~rayscope.core.hits.Hits`, and `item`, its number in the structure."""
+    """The nearest hit of one ray; fields as in :class:`~rayscope.core.hits.Hits`,
+    and `item`, its number in the structure.
+    """
 
     t: float
     primitive: int
@@ -73,8 +75,9 @@ class Structure:
 
     @classmethod
     def beside(cls, other, row, parameters, progress=None):
-        """Build over the scene of another structure, whose primitives are used again; inside instances each technique has
-        structures of its own."""
+        """Build over the scene of another structure, whose primitives are used again;
+        inside instances each technique has structures of its own.
+        """
         if any(p.KIND == "instance" for p in other.primitives):
             return cls.over(other.scene, row, parameters, progress)
         index = cls(list(other.primitives), parameters, progress)
@@ -99,13 +102,15 @@ class Structure:
         Parameters
         ----------
         query : Closest or Occluded
-            ``query.ray`` is the ray, ``query.t`` the nearest hit so far, ``query.test(item)`` tests a primitive by its number
-            in ``self.primitives``, ``query.watch`` is told every step where it is not None.
+            ``query.ray`` is the ray, ``query.t`` the nearest hit so far, ``query.test(item)`` tests a primitive
+            by its number in ``self.primitives``, ``query.watch`` is told every step where it is not None.
         """
         raise NotImplementedError
 
     def for_light(self, light):
-        """The structure to ask about shadow rays to one of the scene's lights: this one, unless it keeps something for each."""
+        """The structure to ask about shadow rays to one of the scene's lights:
+        this one, unless it keeps something for each.
+        """
         return self
 
     def refit(self, scene):
@@ -140,7 +145,8 @@ class Structure:
         return Cells.make([], [], [], [], [], [])
 
     def ask(self, question, ray, watch=None, **more):
-        """Put a question (:class:`Closest` or :class:`Occluded`) about a usable ray; the query that knows the answer."""
+        """Put a question (:class:`Closest` or :class:`Occluded`) about a usable ray; the query that knows the answer.
+        """
         query = question(self.primitives, ray, watch, **more)
         if self.primitives:
             self.walk(query)
@@ -179,8 +185,9 @@ class Structure:
         return self.ask(Occluded, ray, watch).blocked
 
     def shadowed_ray(self, ray, through, watch=None):
-        """Two of bool: whether a ray is blocked by something that lets no light through; and if it is not, whether something
-        that does is met. `through` says of each of the scene's objects whether it does."""
+        """Two of bool: whether a ray is blocked by something that lets no light through; and if it is not,
+        whether something that does is met. `through` says of each of the scene's objects whether it does.
+        """
         if not ray.usable:
             return False, False
         if watch:
@@ -202,7 +209,8 @@ class Structure:
         progress : callable, optional
             Called with the fraction done after every ray; may raise Cancelled.
         leaving : (sequence of int, sequence of int), optional
-            `object` and `primitive` of the hits that the rays leave, -1 for none: a hint, for techniques that follow rays.
+            `object` and `primitive` of the hits that the rays leave,
+            -1 for none: a hint, for techniques that follow rays.
 
         Returns
         -------

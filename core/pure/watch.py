@@ -1,6 +1,7 @@
 """Who is told every step of a ray: counters, the ray stepper and teaching listen here.
 
-The structures call these methods only when there is somebody to listen (``if watch:``), so an unwatched ray pays nothing.
+The structures call these methods only when there is somebody
+to listen (``if watch:``), so an unwatched ray pays nothing.
 """
 
 
@@ -40,7 +41,9 @@ class Watch:
         """A stretch of the ray is skipped in one step."""
 
     def enter(self, instance, ray):
-        """An instance is entered: what follows is told of the ray in its own space, and in the numbers of `instance.inner`."""
+        """An instance is entered: what follows is told of the ray
+        in its own space, and in the numbers of `instance.inner`.
+        """
 
     def leave(self, instance, ray):
         """Back in the space of `ray`."""

@@ -77,7 +77,9 @@ class Camera:
         return cls(matrix, (-half * aspect, half * aspect, -half, half), **more)
 
     def frame(self):
-        """Position, right, up and forward: four triples; the last three are unit vectors, right and up orthogonal to forward."""
+        """Position, right, up and forward: four triples; the last
+        three are unit vectors, right and up orthogonal to forward.
+        """
         m = np.asarray(self.matrix, float)
         right, up, back = (m[:3, i] / np.linalg.norm(m[:3, i]) for i in range(3))
         return m[:3, 3], right, up, -back
@@ -88,7 +90,8 @@ class Camera:
         Parameters
         ----------
         x, y : ndarray, shape (n,)
-            Picture coordinates in pixels from the left and from the *bottom* edge; the centre of the first pixel is 0.5.
+            Picture coordinates in pixels from the left and from the *bottom* edge;
+            the centre of the first pixel is 0.5.
         size : tuple of int
             Width and height in pixels.
 

@@ -19,8 +19,8 @@ def ears(flat):
     Returns
     -------
     list of (int, int, int)
-        Corners of the triangles, wound as the polygon is; those without area are left out. Only of a polygon that crosses
-        itself the areas do not add up to :func:`area`.
+        Corners of the triangles, wound as the polygon is; those without area are left out.
+        Only of a polygon that crosses itself the areas do not add up to :func:`area`.
     """
     sign = 1.0 if area(flat) >= 0.0 else -1.0
     left = [i for i in range(len(flat)) if flat[i] != flat[i - 1]]

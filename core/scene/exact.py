@@ -4,16 +4,17 @@ import math
 
 from ..vectors import cross, dot, minus
 
-#: Edge functions whose sum is smaller than this part of the products that they consist of are calculated exactly: above,
-#: rounding moves a hit along the ray by 2^-53 / DOUBTFUL of the triangle's extent at most, and that only where it is seen
-#: edge-on, so that the hit is as little off its plane.
+#: Edge functions whose sum is smaller than this part of the products that they consist of are
+#: calculated exactly: above, rounding moves a hit along the ray by 2^-53 / DOUBTFUL of the triangle's
+#: extent at most, and that only where it is seen edge-on, so that the hit is as little off its plane.
 DOUBTFUL = 2.0**-16
 
-#: How far off t may be, in 2^-52 of |t| and of the scene's size. The watertight test's is off by |t| + (|t| + looseness) / slope at most
-#: (measured; the roundings one by one add up to three times that). slope: sine of the angle between ray and plane, or more exactly, area
-#: seen along the ray's main axis by area; looseness: the triangle's extent, plus its cube by twice the area, as the weights in narrow
-#: triangles are badly determined. Beyond what is allowed t is calculated again: from near by (:func:`nearby`), where the looseness alone
-#: allows that, else exactly (:func:`crossing`).
+#: How far off t may be, in 2^-52 of |t| and of the scene's size. The watertight test's is off by |t| + (|t| +
+#: looseness) / slope at most (measured; the roundings one by one add up to three times that). slope: sine of the angle
+#: between ray and plane, or more exactly, area seen along the ray's main axis by area; looseness: the triangle's
+#: extent, plus its cube by twice the area, as the weights in narrow triangles are badly determined. Beyond what is
+#: allowed t is calculated again: from near by (:func:`nearby`), where the looseness alone allows that, else exactly
+#: (:func:`crossing`).
 ALLOWED = 8.0
 #: By how much of its distance rounding moves a vertex sideways, as the watertight test sees it: at most.
 SEEN = 2.0**-50
@@ -89,7 +90,8 @@ def stretch(x, y, t, far):
 
 
 def on_polygon(points, sz, t):
-    """Where a ray within a polygon's plane, all but for rounding, passes it: the t there that is nearest to a given one.
+    """Where a ray within a polygon's plane, all but for rounding,
+    passes it: the t there that is nearest to a given one.
 
     Parameters
     ----------
@@ -120,7 +122,8 @@ def on_polygon(points, sz, t):
 def refined(o, d, corners, t, low, high, deep):
     """t once more, where a line crosses the plane of a triangle.
 
-    But not where that is beside the triangle: of a ray that lies in the plane all but for rounding any t is right within it.
+    But not where that is beside the triangle: of a ray that lies
+    in the plane all but for rounding any t is right within it.
 
     Parameters
     ----------

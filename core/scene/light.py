@@ -26,8 +26,9 @@ class Light:
     direction : tuple of float
         Unit vector along which sun, spot and area lights shine.
     radius : float
-        Point and spot: of the luminous sphere, which counts as its disc that faces the point lit, as in Blender with soft
-        falloff: at distance D, on its axis, irradiance is colour / (D^2 + radius^2). Sun: tangent of half its angular diameter. 0 gives hard shadows.
+        Point and spot: of the luminous sphere, which counts as its disc that faces the point
+        lit, as in Blender with soft falloff: at distance D, on its axis, irradiance is colour
+        / (D^2 + radius^2). Sun: tangent of half its angular diameter. 0 gives hard shadows.
     spot_angle : float
         Full opening angle of the cone, radians.
     spot_blend : float

@@ -56,7 +56,9 @@ class Placed:
                                                               for name in ("matrix", "origin", "inverse", "object_of", "primitive_of")))
 
     def mesh_corners(self):
-        """World corners of the first solid's triangles, a closed mesh: shape (9, triangles); and whether they are turned inside out."""
+        """World corners of the first solid's triangles, a closed mesh:
+        shape (9, triangles); and whether they are turned inside out.
+        """
         own = self.solids[0].values["mesh"]
         x, y, z = own.vertices.T
         m, c = self.matrix[..., 0], self.origin[:, 0]
@@ -251,8 +253,8 @@ class Corners:
         normal = np.where(flat, 0.0, normal / np.where(flat, 1.0, length) * mirror)
         away = ((xyz - anchor[:, owner]) * normal[:, owner]).sum(axis=0)
         off = np.maximum.reduceat(np.abs(away), first)
-        # A ray meets the plane: corners beside it would make boxes that miss its hits. Corners off by rounding alone stay
-        # as they are, or neighbours would no longer share them.
+        # A ray meets the plane: corners beside it would make boxes that miss its hits. Corners
+        # off by rounding alone stay as they are, or neighbours would no longer share them.
         rounding = ROUNDED_OFF * np.maximum.reduceat(np.abs(xyz).max(axis=0), first)
         xyz = xyz - np.where(off > rounding, 1.0, 0.0)[owner] * away * normal[:, owner]
         return cls(start, xyz, following, normal, anchor, off, scale)

@@ -2,8 +2,8 @@
 
 V. Havran and F. Sixta, Comparison of Hierarchical Grids, and V. Havran, A Summary of Octree Ray Traversal Algorithms,
 Ray Tracing News 12(1) and 12(2), 1999. Rays: 513 x 513 through the corners of pixels, their shadow rays, reflections
-and refractions, as in test_spd_invariants. No mailboxes. N_IT and N_TS are means over all rays; but N_IT of octrees is per ray
-that hits: so calculated, ours are his (``rays_over_hits``).
+and refractions, as in test_spd_invariants. No mailboxes. N_IT and N_TS are means over all rays;
+but N_IT of octrees is per ray that hits: so calculated, ours are his (``rays_over_hits``).
 
     python -m pytest tests/literature        checks all of it
     python tests/literature/table.py         prints the tables of the README
@@ -120,8 +120,10 @@ def by_boxes(self, item, lo, hi):
 
 
 def thick(self):
-    """His boxes of polygons of more than three corners, in place of ``Polygons.bounds``: as if they were THICK to either side, along
-    every axis that their normals have more than SLOPE of. Found by trying, with gears, whose teeth are smaller than that."""
+    """His boxes of polygons of more than three corners, in place of ``Polygons.bounds``:
+    as if they were THICK to either side, along every axis that their normals have more
+    than SLOPE of. Found by trying, with gears, whose teeth are smaller than that.
+    """
     normal = np.abs(self.corners.normal.T)
     grown = THICK * (normal > SLOPE * np.linalg.norm(normal, axis=1, keepdims=True))
     return self.lo - grown, self.hi + grown
@@ -132,8 +134,9 @@ THICK, SLOPE = 0.02, 0.3
 
 
 def by_open_boxes(self, item, lo, hi):
-    """As `by_boxes`, cells being open below: what touches a cell's lower faces only is not in it. It matters to tetra alone, whose
-    vertices lie on planes between cells."""
+    """As `by_boxes`, cells being open below: what touches a cell's lower faces only is not in it.
+    It matters to tetra alone, whose vertices lie on planes between cells.
+    """
     inside = by_boxes(self, item, lo, hi)
     return inside & (self.hi[item] > lo + TOUCHES * (self.hi.max() - self.lo.min())).all(axis=1)
 

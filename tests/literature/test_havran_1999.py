@@ -112,8 +112,9 @@ def test_octree_with_his_lists(name, monkeypatch):
 
 @pytest.mark.parametrize("name", REPEATABLE)
 def test_octree_r_with_his_lists(name, monkeypatch):
-    """His ten planes lie between the same two medians, but where exactly is not said. A plane through the gap between two gears or
-    one through their rims makes little difference in cost, and much in references."""
+    """His ten planes lie between the same two medians, but where exactly is not said. A plane through the
+    gap between two gears or one through their rims makes little difference in cost, and much in references.
+    """
     list_as_he_did(monkeypatch)
     inner, _, references = OCTREE["cost"][name][:3]
     figures = octree_of(name, "cost").figures
@@ -134,7 +135,9 @@ def test_octree_steps_per_ray(name, split, monkeypatch):
 @pytest.mark.parametrize("split", OCTREE)
 @pytest.mark.parametrize("name", SCENES)
 def test_octree_tests_are_published_per_hit(name, split, monkeypatch):
-    """Per ray that hits, ours are his; per ray, they are half of his or less, except in lattice, where nearly all rays hit."""
+    """Per ray that hits, ours are his; per ray, they are half of his or less,
+    except in lattice, where nearly all rays hit.
+    """
     list_as_he_did(monkeypatch, by_open_boxes if name == "tetra" else by_boxes)
     scene, rays = scene_and_rays(name)
     n_it, _ = per_ray(octree_of(name, split, walk="heap"), rays)

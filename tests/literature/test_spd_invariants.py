@@ -1,14 +1,15 @@
 """Numbers of rays that any correct ray tracer must find on the Standard Procedural Databases, whatever its method.
 
-Published by V. Havran and F. Sixta, Comparison of Hierarchical Grids, Ray Tracing News 12(1), 1999: 513 x 513 rays through
-the corners of pixels; every hit sends a shadow ray to each light on the side of its geometric normal, a reflected ray where
-Ks > 0 or T > 0, and a refracted one where T > 0, down to four bounces. They traced the databases as printed, with six
-digits. The paper does not say all of its rules: these were found by trying, as the ones that come nearest to its numbers.
+Published by V. Havran and F. Sixta, Comparison of Hierarchical Grids, Ray Tracing News 12(1), 1999: 513 x 513 rays
+through the corners of pixels; every hit sends a shadow ray to each light on the side of its geometric normal, a
+reflected ray where Ks > 0 or T > 0, and a refracted one where T > 0, down to four bounces. They traced the databases as
+printed, with six digits. The paper does not say all of its rules: these were found by trying, as the ones that come
+nearest to its numbers.
 
-One of them is a guess at how his program worked. A shadow ray that leaves a polygon on the side that the viewer's ray did
-not come from (from within a glass gear, to a light outside) counts as blocked, as if it began a little before the polygon;
-of spheres it does not. Without it a fifth of the blocked shadow rays is missing among the gears; with it all numbers of all
-scenes are within 9 %.
+One of them is a guess at how his program worked. A shadow ray that leaves a polygon on the side that the viewer's ray
+did not come from (from within a glass gear, to a light outside) counts as blocked, as if it began a little before the
+polygon; of spheres it does not. Without it a fifth of the blocked shadow rays is missing among the gears; with it all
+numbers of all scenes are within 9 %.
 """
 
 import numpy as np

@@ -33,7 +33,8 @@ class Volumes:
     Attributes
     ----------
     columns : ndarray, shape (2 + c, n)
-        How rounding of rays grows in what is inside (`stretch` and `reach`, see :func:`margins`), then the kind's numbers.
+        How rounding of rays grows in what is inside (`stretch` and `reach`,
+        see :func:`margins`), then the kind's numbers.
     """
 
     #: Whether volumes around volumes (``joined``) are as tight as volumes around what is in them.

@@ -48,6 +48,7 @@ def box_area(size):
 
 
 def box_shadow(size, cosine):
-    """Areas of the shadows of boxes whose edges are `size`, shape (3, n), by the cosines of their angles to the light."""
+    """Areas of the shadows of boxes whose edges are `size`, shape (3, n), by the cosines of their angles to the light.
+    """
     x, y, z = size
     return cosine[0] * y * z + cosine[1] * z * x + cosine[2] * x * y

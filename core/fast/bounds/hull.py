@@ -1,4 +1,5 @@
-"""Balls (points, where the radius is 0) whose convex hull holds each primitive: what spheres and oriented boxes are fitted to.
+"""Balls (points, where the radius is 0) whose convex hull holds each primitive:
+what spheres and oriented boxes are fitted to.
 
 For triangles, polygons, boxes and pyramids they are the corners, for spheres the sphere, for circles corners of a
 regular polygon around them (their radius 0.5 % larger); for anything else the corners of its box.

@@ -53,7 +53,8 @@ class KDops(Volumes):
         t_in, t_out, slack = t_min, t_far, 4.0 * slack
         with np.errstate(invalid="ignore", over="ignore"):
             for a in range(half):
-                # Speed along an oblique slab is rounded too; what that moves over the way to it grows with the slab's distance.
+                # Speed along an oblique slab is rounded too; what that
+                # moves over the way to it grows with the slab's distance.
                 low, high = volume[a], volume[a + half]
                 own = slack if a < 3 else slack + 8.0 * EPSILON * np.maximum(np.abs(low), np.abs(high))
                 t_in, t_out = between(t_in, t_out, low - own, high + own, ray[a], ray[a + half])

@@ -1,4 +1,6 @@
-"""Oriented boxes (Gottschalk, Lin and Manocha 1996): along the principal axes of the corners, or along the world's where that is smaller."""
+"""Oriented boxes (Gottschalk, Lin and Manocha 1996): along the principal
+axes of the corners, or along the world's where that is smaller.
+"""
 
 import numpy as np
 

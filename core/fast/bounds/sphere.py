@@ -145,8 +145,8 @@ def _of_five(centre, radius, ball, basis):
 def _touching(d, r0, r):
     """Yield spheres (centre relative to ball 0, radius) that touch ball 0 and k others at `d` (3, k, n) from within.
 
-    |x| = R - r0 and |x - d_i| = R - r_i; the difference of their squares is linear: d_i . x = e_i + R f_i. With x in the
-    span of the d_i, x = u + R v, and |u + R v| = R - r0 is a quadratic equation.
+    |x| = R - r0 and |x - d_i| = R - r_i; the difference of their squares is linear: d_i . x = e_i + R f_i.
+    With x in the span of the d_i, x = u + R v, and |u + R v| = R - r0 is a quadratic equation.
     """
     k = d.shape[1]
     if k == 0:

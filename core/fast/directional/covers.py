@@ -1,8 +1,8 @@
 """Which cells of a window primitives surely cover: full occluders (Haines and Greenberg 1986).
 
-A cell is covered when its corners are seen within a convex outline that lies in the primitive: the triangle itself, or the
-box inscribed in a solid or a polygon. A triangle and the next one of its mesh share an outline if they share an edge and
-are convex together: as a rule they are one face. All that could be rounded is taken off the outline.
+A cell is covered when its corners are seen within a convex outline that lies in the primitive: the triangle itself,
+or the box inscribed in a solid or a polygon. A triangle and the next one of its mesh share an outline if they share
+an edge and are convex together: as a rule they are one face. All that could be rounded is taken off the outline.
 """
 
 import numpy as np
@@ -39,7 +39,8 @@ class Covers:
         primitives : Primitives
         item : ndarray
         searched : bool
-            Without, triangles are outlined one by one, and Boolean combinations, where a box within has to be searched for, not.
+            Without, triangles are outlined one by one, and Boolean combinations,
+            where a box within has to be searched for, not.
         """
         n = len(item)
         which = np.searchsorted(primitives.starts, item, side="right") - 1
@@ -65,7 +66,9 @@ class Covers:
         return cls(edges, low, other, loose)
 
     def least(self, which, u, v, wide, high):
-        """Least nearness in the cells within (wide, high) of (u, v), -inf where outlines do not cover them; one pair each."""
+        """Least nearness in the cells within (wide, high) of (u, v),
+        -inf where outlines do not cover them; one pair each.
+        """
         wide, high = wide + 2.0**-30, high + 2.0**-30
         with np.errstate(invalid="ignore"):
             nearness = np.minimum(*(a * u + b * v + c - np.abs(a) * wide - np.abs(b) * high
@@ -83,7 +86,9 @@ class Covers:
 
 
 def _of_faces(view, kind, item):
-    """Edges and both planes of triangles, each with the next one, or the one before, where the two are convex; how loose the other is."""
+    """Edges and both planes of triangles, each with the next one, or the one before,
+    where the two are convex; how loose the other is.
+    """
     edges, low, _, corners, slack, sure = _of_triangles(view, kind.hull(item))
     outer = np.concatenate([edges, np.broadcast_to([[[0.0]], [[0.0]], [[1.0]]], (3, 1, len(item)))], axis=1)
     other, loose, left = low.copy(), np.full(len(item), -np.inf), np.flatnonzero(sure)
@@ -118,8 +123,8 @@ def _of_faces(view, kind, item):
 def _of_triangles(view, corners):
     """Triangles (3, 3, m): edges and planes, the rows of the inverse of the matrix of corners (Olano and Greer 1997).
 
-    Also by how much more they are nearer than their planes at most, the corners in the view, what edges are within the triangle by,
-    and whether that is any good.
+    Also by how much more they are nearer than their planes at most, the corners in the view,
+    what edges are within the triangle by, and whether that is any good.
     """
     with np.errstate(all="ignore"):
         x, y, z, away = view.points(corners)
@@ -144,7 +149,8 @@ def _of_triangles(view, corners):
 
 
 def _of_boxes(view, corners):
-    """Edges around, and the farthest nearness of, boxes (m, 8, 3); the edges join corners, so the outline lies within."""
+    """Edges around, and the farthest nearness of, boxes (m, 8, 3); the edges join corners, so the outline lies within.
+    """
     with np.errstate(all="ignore"):
         x, y, z, away = view.points(corners.transpose(2, 1, 0))
         e = ROUNDING * view.scale * (away.max(axis=0) + view.extra)

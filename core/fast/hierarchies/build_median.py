@@ -1,4 +1,5 @@
-"""Top-down construction by the median: each node is halved by number, along the axis on which its centres spread most."""
+"""Top-down construction by the median: each node is halved by number, along the axis on which its centres spread most.
+"""
 
 import numpy as np
 

@@ -96,7 +96,8 @@ def _partners(box):
     """The neighbour each cluster would best merge with.
 
     All candidates of a cluster compete by one number: the bits of the merged box's area, which order like the area
-    itself, with the low bits replaced by the distance in the order, a tie-breaker that both sides see alike, and the side.
+    itself, with the low bits replaced by the distance in the order,
+    a tie-breaker that both sides see alike, and the side.
     """
     n = box.shape[1]
     best = np.full(n, 0xFFFFFFFF, np.uint32)

@@ -15,8 +15,8 @@ def build(boxes, leaf_size, progress):
     boxes : ndarray, shape (6, n), float32
         Unit boxes of the primitives.
     leaf_size : int
-        Nodes with more primitives are divided, by the SAH's best plane; by halves of their number where all centres agree.
-        Nodes with at most this many are divided too where the SAH says that it pays.
+        Nodes with more primitives are divided, by the SAH's best plane; by halves of their number where
+        all centres agree. Nodes with at most this many are divided too where the SAH says that it pays.
     progress : callable
 
     Returns

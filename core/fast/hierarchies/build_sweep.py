@@ -1,4 +1,5 @@
-"""Top-down construction by the surface area heuristic with a full sweep: every position between two centres is tried."""
+"""Top-down construction by the surface area heuristic with a full sweep: every position between two centres is tried.
+"""
 
 import numpy as np
 

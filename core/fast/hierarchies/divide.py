@@ -1,4 +1,6 @@
-"""What the top-down builders of volume trees share: dividing all nodes of a level at once, each into any number of parts."""
+"""What the top-down builders of volume trees share: dividing
+all nodes of a level at once, each into any number of parts.
+"""
 
 import numpy as np
 

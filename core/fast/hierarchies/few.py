@@ -5,7 +5,8 @@ from struct import Struct
 
 import numpy as np
 
-#: Rays that are few. Measured: so many take as long as with numpy if their directions have the same signs, half as long if not.
+#: Rays that are few. Measured: so many take as long as with numpy
+#: if their directions have the same signs, half as long if not.
 FEW = 16
 #: Leaves that a ray meets before its primitives are tested.
 LEAVES = 8

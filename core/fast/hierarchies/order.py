@@ -22,7 +22,8 @@ def order_of(primitives, order, seed):
 
 
 def codes(lo, hi):
-    """Places on a Morton curve, in double precision (the builders' own codes are made from boxes in single precision)."""
+    """Places on a Morton curve, in double precision (the builders' own codes are made from boxes in single precision).
+    """
     least, most = lo.min(axis=0), hi.max(axis=0)
     middle = 0.5 * least + 0.5 * most
     size = float(np.maximum(most - middle, middle - least).max()) or 1.0

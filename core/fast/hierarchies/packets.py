@@ -1,9 +1,10 @@
-"""Neighbouring rays go down the packed tree together as far as that pays (Wald et al. 2007: packets by interval arithmetic).
+"""Neighbouring rays go down the packed tree together as far as
+that pays (Wald et al. 2007: packets by interval arithmetic).
 
-A packet is a run of rays. Its bounds on origins and reciprocals give bounds on where any of its rays enters and leaves a box:
-rounding is monotonic, so what is calculated from the bounds bounds what is calculated from each ray. Packets of rays that
-belong together reach small boxes at a fraction of the cost, and smaller packets go on from there; others spread over the
-tree at once, and are broken up where they do.
+A packet is a run of rays. Its bounds on origins and reciprocals give bounds on where any of its rays enters and leaves
+a box: rounding is monotonic, so what is calculated from the bounds bounds what is calculated from each ray. Packets of
+rays that belong together reach small boxes at a fraction of the cost, and smaller packets go on from there; others
+spread over the tree at once, and are broken up where they do.
 """
 
 import numpy as np
@@ -12,8 +13,8 @@ from .slabs import four, meet
 
 #: Rays of a packet, the largest first; powers of two.
 PACKETS = (64, 16)
-#: Packets are broken up where the next level of the tree has so many more nodes for each of them: a ray, too, meets about
-#: one node a level, and what is met by the packet only costs all of its rays one more.
+#: Packets are broken up where the next level of the tree has so many more nodes for each of them: a ray,
+#: too, meets about one node a level, and what is met by the packet only costs all of its rays one more.
 GROWTH = 0.8
 #: Rays for which it is not worth while.
 FEW = 2_048
@@ -59,7 +60,8 @@ def descend(tree, unit, near, far, limit, alive, room):
 
 
 def _bounds(unit, limit, alive):
-    """For each size of packets their least and greatest origins and reciprocals (6 arrays each), and greatest limits."""
+    """For each size of packets their least and greatest origins and reciprocals (6 arrays each), and greatest limits.
+    """
     # The last packet is filled up with its last ray.
     alive = np.concatenate([alive, np.repeat(alive[-1:], -len(alive) % PACKETS[0])])
     least = most = [values.take(alive) for values in unit.values]

@@ -1,8 +1,9 @@
-"""The slab test of the packed tree: the four boxes of a node at once, against a ray or a packet of rays (Kay and Kajiya 1986).
+"""The slab test of the packed tree: the four boxes of a node at once,
+against a ray or a packet of rays (Kay and Kajiya 1986).
 
 A node is `LINES` lines of sixteen bytes: the low and high edges of its four children's boxes, an axis a line, then the
-children's numbers. Lines are complex128, only because that is numpy's sixteen-byte number: one ``take`` fetches four floats,
-and all arithmetic runs on contiguous arrays. What belongs to a ray is kept four times over in the same way.
+children's numbers. Lines are complex128, only because that is numpy's sixteen-byte number: one ``take`` fetches four
+floats, and all arithmetic runs on contiguous arrays. What belongs to a ray is kept four times over in the same way.
 """
 
 import numpy as np

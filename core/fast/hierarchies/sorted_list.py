@@ -1,9 +1,9 @@
 """The flat list, done efficiently: the bounding volumes that each ray meets, sorted by where it enters them.
 
-Primitives are tested in that order, until a hit is nearer than where the next volume begins. (Not: until the first hit.)
-Rays are taken in blocks of neighbours: volumes that none of a block can meet, by interval arithmetic on the slab test, are
-left out; the others are tested against its rays, all at once. Then each ray takes the next of its own list in every round,
-or all that it enters at the same place: no hit can come between these.
+Primitives are tested in that order, until a hit is nearer than where the next volume begins. (Not: until the first
+hit.) Rays are taken in blocks of neighbours: volumes that none of a block can meet, by interval arithmetic on the slab
+test, are left out; the others are tested against its rays, all at once. Then each ray takes the next of its own list in
+every round, or all that it enters at the same place: no hit can come between these.
 """
 
 import numpy as np
@@ -61,7 +61,8 @@ class SortedList(Structure):
         ray, volume, t_in = ray[order], volume[order], t_in[order]
         if query.counts:
             query.counts.steps(np.arange(rays.n))
-        # The place of each ray's next volume, the end of its list, and after each volume the next that is entered elsewhere.
+        # The place of each ray's next volume, the end of its list,
+        # and after each volume the next that is entered elsewhere.
         end = np.cumsum(np.bincount(ray, minlength=rays.n))
         place = np.concatenate([[0], end[:-1]])
         elsewhere = np.append(np.flatnonzero((ray[1:] != ray[:-1]) | (t_in[1:] != t_in[:-1])) + 1, len(ray))
@@ -82,7 +83,9 @@ class SortedList(Structure):
             most *= 2
 
     def _at_once(self, query, n, most):
-        """Volumes entered at the same place, at most, that each of n rays takes now; where any hit will do, no more than twice what was in vain."""
+        """Volumes entered at the same place, at most, that each of n rays takes now;
+        where any hit will do, no more than twice what was in vain.
+        """
         if query.counts and (isinstance(query, Occluded) or self.primitives.structures()):
             return 1                                    # what is counted is what a ray alone would do
         fit = max(1, TESTS // n)
@@ -101,7 +104,9 @@ class SortedList(Structure):
             query.test(ray[at], self.item[self.start[volume[at]] + pair - (end - count)[at]])
 
     def _neighbours(self, rays):
-        """An order of rays in which those come together that start, or enter the list's box, near each other and go the same way."""
+        """An order of rays in which those come together that start,
+        or enter the list's box, near each other and go the same way.
+        """
         lo, hi = self.lo.min(axis=1)[:, None], self.hi.max(axis=1)[:, None]
         size = np.where(hi > lo, hi - lo, 1.0)
         with np.errstate(all="ignore"):
@@ -113,7 +118,9 @@ class SortedList(Structure):
         return curve[np.argsort(octant[curve], kind="stable")]
 
     def _near(self, rays, values, query, block):
-        """Volumes whose boxes some line between those of a block's rays may meet; never leaves out one that a ray meets."""
+        """Volumes whose boxes some line between those of a block's rays may meet;
+        never leaves out one that a ray meets.
+        """
         near, far = np.full(len(self.volumes), values[1][block].min()), np.full(len(self.volumes), query.t[block].max())
         spare = values[0][block].max()
         stretch, reach = self.volumes.columns[:2]
@@ -134,7 +141,8 @@ class SortedList(Structure):
             return np.flatnonzero(near - 8.0 * EPSILON * np.abs(near) <= far + 8.0 * EPSILON * np.abs(far))
 
     def _met(self, values, query, ray, near):
-        """Rays, volumes and entries of the pairs that meet, sorted by ray and entry; of equal entries the lower number first.
+        """Rays, volumes and entries of the pairs that meet, sorted
+        by ray and entry; of equal entries the lower number first.
 
         `near` are the volumes that come into question.
         """

@@ -1,4 +1,6 @@
-"""Sphere tree (Palmer and Grimsdale 1995): the primitives are divided as in an octree, with the smallest spheres around them."""
+"""Sphere tree (Palmer and Grimsdale 1995): the primitives are
+divided as in an octree, with the smallest spheres around them.
+"""
 
 import numpy as np
 

@@ -167,7 +167,8 @@ class VolumeStructure(Structure):
         self.measure()
 
     def _put_volumes(self, around, progress=no_progress):
-        """Volumes around all nodes; ``around(node, item, offset)`` makes those of some nodes around their primitives."""
+        """Volumes around all nodes; ``around(node, item, offset)`` makes those of some nodes around their primitives.
+        """
         tree = self.tree
         parts, areas = [], []
         for begin, end in reversed(tree.levels()):

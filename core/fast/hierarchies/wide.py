@@ -44,7 +44,8 @@ class WideTree:
     lines : ndarray, shape (8 w,), complex128
         w nodes. Child numbers are those of the child's first line for inner nodes, ~leaf for leaves.
     first, count : ndarray
-        Ranges of `order` of the leaves; None when every leaf holds one primitive, whose number then stands for the leaf.
+        Ranges of `order` of the leaves; None when every leaf holds one primitive,
+        whose number then stands for the leaf.
     """
 
     def __init__(self, tree):
@@ -168,7 +169,8 @@ def runs(frame, rays):
     Returns
     -------
     list of (ndarray, UnitRays)
-        The rays' numbers, in order; the directions of a run have the same signs, and those of a long one the same main axis.
+        The rays' numbers, in order; the directions of a run have the same signs,
+        and those of a long one the same main axis.
     """
     entered = enter(frame, rays)
     # By the sign bit: the reciprocal of -0.0 counts as negative, too.

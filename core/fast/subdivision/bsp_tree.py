@@ -156,7 +156,9 @@ class BspTree(CellTree):
         return low, high
 
     def _columns(self, cells):
-        """Corners of fragments as columns, (corner, axis, fragment), and which fragments have each; None: all that have any."""
+        """Corners of fragments as columns, (corner, axis, fragment),
+        and which fragments have each; None: all that have any.
+        """
         if self._kept is None or self._kept[0] is not cells:
             corners, number = cells.more
             having = [None] * 3

@@ -56,7 +56,8 @@ class KdTree(CellTree):
         return 2 * np.floor((hi + self.margin - self.lo) / self.unit).astype(np.int32) + 2
 
     def divide_cells(self, cells, worth):
-        """Divide cells; see ``growth.grow``. What they keep of each reference are, for each axis, the ends of its part."""
+        """Divide cells; see ``growth.grow``. What they keep of each reference are, for each axis, the ends of its part.
+        """
         m, i = len(cells.count), np.arange(len(cells.count))
         low, high = (2 * np.rint((x - self.lo) / self.unit).astype(np.int32) for x in (cells.lo, cells.hi))
         if self.split == "middle":
@@ -140,7 +141,8 @@ class KdTree(CellTree):
     def _cheapest(self, cells, low, high):
         """Axis, end of a box, and cost of the cheapest plane of each cell; `low` and `high` are the cells' bounds.
 
-        Cells with about the same number of primitives are the columns of a table, with the ends of all boxes, sorted, as its rows.
+        Cells with about the same number of primitives are the columns of a table,
+        with the ends of all boxes, sorted, as its rows.
         """
         m, first = len(cells.count), np.cumsum(cells.count) - cells.count
         best, axis, chosen = np.full(m, np.inf), np.zeros(m, np.int64), np.zeros(m, np.int32)

@@ -14,7 +14,8 @@ import numpy as np
 
 from ..hierarchies.wide import along_curve
 
-#: Rays in the pool, steps between two looks at who is done, and the part that must be done for the pool to be filled up.
+#: Rays in the pool, steps between two looks at who is done,
+#: and the part that must be done for the pool to be filled up.
 POOL, STEPS, DONE = 32_768, 4, 8
 #: A component of a direction, relative to the largest, with which a ray crosses no plane.
 STILL = 2.0**-60
@@ -133,11 +134,12 @@ def walk(grid, regions, rays, ray, t_in, t_out, visits, query):
 
 
 def _columns(grid, rays, ray, t_in, t_out):
-    """What rays need on their way, three columns each but for the last three, in the order in which they enter the grid.
+    """What rays need on their way, three columns each but for the last three,
+    in the order in which they enter the grid.
 
     Their cells; what turns the cells' numbers around; the parameters of the planes above cells 0; those between planes;
-    cells walked in a unit of the parameter, and the place at parameter 0, in cells; where they are, where they leave the
-    grid, their numbers.
+    cells walked in a unit of the parameter, and the place at parameter 0,
+    in cells; where they are, where they leave the grid, their numbers.
     """
     t = t_in.take(ray)
     o = [rays.o[axis].take(ray) for axis in range(3)]

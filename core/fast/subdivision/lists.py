@@ -101,8 +101,8 @@ class Lists:
 class Visits:
     """The tests of a batch of rays in cells.
 
-    Where nothing is counted, a sieve leaves out pairs that cannot hit, and mailboxes and marks may forget; neither changes
-    a hit.
+    Where nothing is counted, a sieve leaves out pairs that cannot hit,
+    and mailboxes and marks may forget; neither changes a hit.
 
     Parameters
     ----------

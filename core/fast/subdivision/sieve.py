@@ -2,9 +2,9 @@
 
 As in the packed hierarchy (``hierarchies.wide``), four boxes lie side by side in lines of sixteen bytes, so that one
 ``take`` fetches four numbers and all arithmetic runs on contiguous arrays. As in the watertight test of triangles, axes
-are renamed so that z is the direction's largest component, and the line is x = px + sx z, y = py + sy z. It is held against
-the box's outlines in the planes xz and yz; against that in xy, where it is shortest, it hardly ever matters. In float32,
-with room for every rounding: no pair that hits is ever left out, so that leaving out changes no hit.
+are renamed so that z is the direction's largest component, and the line is x = px + sx z, y = py + sy z. It is held
+against the box's outlines in the planes xz and yz; against that in xy, where it is shortest, it hardly ever matters.
+In float32, with room for every rounding: no pair that hits is ever left out, so that leaving out changes no hit.
 """
 
 import numpy as np
@@ -12,7 +12,8 @@ import numpy as np
 from ..rays import AXES
 from .lists import chunks, ranges
 
-#: In units of the scene's longest edge: what float32 may lose of centres, origins and products, and twice as much again.
+#: In units of the scene's longest edge: what float32 may lose of centres,
+#: origins and products, and twice as much again.
 PAD = 2.0**-20
 #: Boxes looked at together: columns that stay in the cache.
 BOXES = 16_384
@@ -71,7 +72,9 @@ class Boxes:
         return axes, [np.repeat(x.astype(np.float32), self.SIDE_BY_SIDE).view(self.LINE) for x in lines]
 
     def pairs(self, aimed, ray, item, first, count):
-        """The pairs (ray, primitive) that may hit, of rays with the primitives item[first], item[first + 1], ...; count >= 1."""
+        """The pairs (ray, primitive) that may hit, of rays with the
+        primitives item[first], item[first + 1], ...; count >= 1.
+        """
         rays, items = [], []
         for some in chunks(count, BOXES):
             own, of = np.repeat(ray[some], count[some]), item.take(ranges(first[some], count[some]))
@@ -81,7 +84,8 @@ class Boxes:
         return np.concatenate(rays), np.concatenate(items)
 
     def _met(self, aimed, ray, place):
-        """Which boxes the rays' lines meet, of pairs of a ray and a line of boxes: numbers SIDE_BY_SIDE x pair + box."""
+        """Which boxes the rays' lines meet, of pairs of a ray and a line of boxes: numbers SIDE_BY_SIDE x pair + box.
+        """
         axes, lines = aimed
         if isinstance(axes, tuple):
             boxes = [self.lines[k + half].take(place) for half in (0, 3) for k in axes]
@@ -119,7 +123,8 @@ class Sieve(Boxes):
     Attributes
     ----------
     first : ndarray, shape (lists + 1,)
-        List k's boxes are in the lines first[k] .. first[k + 1] - 1; the last line is filled up with boxes that no ray meets.
+        List k's boxes are in the lines first[k] .. first[k + 1] - 1;
+        the last line is filled up with boxes that no ray meets.
     lines : ndarray, shape (6, lines), complex128
         As those of :class:`Boxes`, four boxes each.
     items : ndarray

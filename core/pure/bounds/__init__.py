@@ -141,8 +141,8 @@ def margin_of(primitive):
 def _sliver(triangle):
     """Stretch and reach of a triangle.
 
-    Its test weighs the corners by areas; in one whose length is many times its height these are uncertain, and so is the
-    hit along its length.
+    Its test weighs the corners by areas; in one whose length is many times
+    its height these are uncertain, and so is the hit along its length.
     """
     e, f = ([x - y for x, y in zip(p, triangle.a)] for p in (triangle.b, triangle.c))
     length = max(max(abs(x), abs(y), abs(x - y)) for x, y in zip(e, f))

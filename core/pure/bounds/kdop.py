@@ -56,7 +56,8 @@ class KDop(Volume):
         for a, low, high in zip(axes, self.low, self.high):
             along = a[0] * ray.o[0] + a[1] * ray.o[1] + a[2] * ray.o[2]
             speed = a[0] * ray.d[0] + a[1] * ray.d[1] + a[2] * ray.d[2]
-            # Speed along an oblique slab is rounded too; what that moves over the way to it grows with the slab's distance.
+            # Speed along an oblique slab is rounded too; what that
+            # moves over the way to it grows with the slab's distance.
             slack = spare + (8.0 * EPSILON * max(abs(low), abs(high)) if a not in BOX else 0.0)
             t_in, t_out = between(t_in, t_out, low - slack, high + slack, along, speed)
             if t_in > t_out:
@@ -73,8 +74,8 @@ class KDop(Volume):
     def _faces(self, weight):
         """The sum of the faces' areas by their weights.
 
-        Where two faces meet, their common line is cut by all other slabs to an edge; a face's area is half the sum of its
-        edges times their distances from one point in its plane.
+        Where two faces meet, their common line is cut by all other slabs to an edge; a face's
+        area is half the sum of its edges times their distances from one point in its plane.
         """
         half = len(self.low)
         if half == 3:
@@ -113,7 +114,8 @@ class KDop(Volume):
 
 
 def between(t_in, t_out, low, high, origin, speed):
-    """Cut an interval of a ray by a slab that it crosses from `origin` with `speed`; robust as ``Ray.through_box`` is."""
+    """Cut an interval of a ray by a slab that it crosses from `origin` with `speed`; robust as ``Ray.through_box`` is.
+    """
     if speed == 0.0:
         return (t_in, t_out) if low <= origin <= high else (math.inf, -math.inf)
     inverse = 1.0 / speed

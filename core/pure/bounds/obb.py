@@ -1,4 +1,6 @@
-"""The oriented box (Gottschalk, Lin and Manocha 1996): along the principal axes of the corners, or along the world's where that is smaller."""
+"""The oriented box (Gottschalk, Lin and Manocha 1996): along the
+principal axes of the corners, or along the world's where that is smaller.
+"""
 
 import math
 

@@ -88,7 +88,9 @@ def smallest(some):
 
 
 def _of_five(ball, basis):
-    """The smallest sphere around a ball and those of a basis, which that ball touches from within: centre, radius, new basis."""
+    """The smallest sphere around a ball and those of a basis,
+    which that ball touches from within: centre, radius, new basis.
+    """
     base, r0 = ball
     best = None
     for size in range(min(len(basis), 3) + 1):
@@ -106,8 +108,8 @@ def _of_five(ball, basis):
 def _touching(d, r0, r):
     """Yield spheres (centre relative to ball 0, radius) that touch ball 0 and others at `d` from within.
 
-    |x| = R - r0 and |x - d_i| = R - r_i; the difference of their squares is linear: d_i . x = e_i + R f_i. With x in the
-    span of the d_i, x = u + R v, and |u + R v| = R - r0 is a quadratic equation.
+    |x| = R - r0 and |x - d_i| = R - r_i; the difference of their squares is linear: d_i . x = e_i + R f_i.
+    With x in the span of the d_i, x = u + R v, and |u + R v| = R - r0 is a quadratic equation.
     """
     if not d:
         yield (0.0, 0.0, 0.0), r0

@@ -1,9 +1,9 @@
 """Beams: all rays whose origins lie in a box and whose directions lie in a rectangle of a direction cube's face.
 
-A face is the dominant axis of a direction: 0 to 5 are +x, -x, +y, -y, +z, -z. Along it, a ray's coordinate m (the negated
-one for a negative axis) only grows; b and c are the coordinates along the two axes that follow, u and v how much they
-change when m grows by 1, each within [-1, 1]. A beam is convex, and lies between four planes in which b or c changes with
-m; what lies beyond one of them, or before the origins, no ray of the beam meets (Arvo and Kirk 1987).
+A face is the dominant axis of a direction: 0 to 5 are +x, -x, +y, -y, +z, -z. Along it, a ray's coordinate m (the
+negated one for a negative axis) only grows; b and c are the coordinates along the two axes that follow, u and v how
+much they change when m grows by 1, each within [-1, 1]. A beam is convex, and lies between four planes in which b or c
+changes with m; what lies beyond one of them, or before the origins, no ray of the beam meets (Arvo and Kirk 1987).
 """
 
 import functools
@@ -33,8 +33,9 @@ class Bounds:
         self.speed = sum(moves) / len(moves) if moves else 0.0
 
     def over(self, first, last):
-        """Of each primitive, where it begins along each face's axis at any time in frames first <= frame < last; along the
-        opposite one it ends at minus that."""
+        """Of each primitive, where it begins along each face's axis at any time in
+        frames first <= frame < last; along the opposite one it ends at minus that.
+        """
         if last - first == 1:
             return self._own[first]
         if (first, last) not in self._over:
@@ -75,8 +76,8 @@ class Beam:
         self.sides = []
         for column, slope, end in ((2 * self.b, hi[U], hi[B]), (2 * self.b + 1, -lo[U], -lo[B]),
                                    (2 * self.c, hi[V], hi[C]), (2 * self.c + 1, -lo[V], -lo[C])):
-            # x <= end + slope (m - m0), m0 being the first origin's or, where the slope is negative, the last one's; then also
-            # x <= end.
+            # x <= end + slope (m - m0), m0 being the first origin's or, where
+            # the slope is negative, the last one's; then also x <= end.
             up, down = max(slope, 0.0), min(slope, 0.0)
             limit, most = end - up * lo[M] - down * hi[M] + slack, end + slack if slope < 0.0 else float("inf")
             self.sides.append((column, slope, up, down, limit, most))

@@ -1,4 +1,6 @@
-"""The direction cube: six windows around a point, each divided into cells with lists (compare Haines and Greenberg 1986)."""
+"""The direction cube: six windows around a point, each divided
+into cells with lists (compare Haines and Greenberg 1986).
+"""
 
 from .view import View
 
@@ -33,7 +35,9 @@ class Cube:
 
     @staticmethod
     def through(w):
-        """Face, place in its window, and distance along its axis, of a direction from the centre; None for no direction."""
+        """Face, place in its window, and distance along its axis,
+        of a direction from the centre; None for no direction.
+        """
         size = [abs(c) for c in w]
         axis = max(range(3), key=lambda a: size[a])
         if not size[axis] > 0.0:
@@ -42,5 +46,6 @@ class Cube:
 
 
 def _ends(footprint, low, high):
-    """A primitive that covers a cell in front of the light, and does not reach to the light itself, is a full occluder."""
+    """A primitive that covers a cell in front of the light, and does not reach to the light itself, is a full occluder.
+    """
     return low > 0.0 and high < float("inf")

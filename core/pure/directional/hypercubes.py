@@ -1,8 +1,8 @@
 """The cells of ray classification: hypercubes of rays, each with the list of primitives that they may hit.
 
-A cell is divided along all axes along which it is wide, so into up to 32 parts, or 64 with time. Parts are made in pairs
-of neighbours when a ray comes, and only then; what was not made goes on with the list of the cell above. A pair whose
-lists are alike shares one, and so does a part whose list is the same as that of the cell above.
+A cell is divided along all axes along which it is wide, so into up to 32 parts, or 64 with time. Parts are made
+in pairs of neighbours when a ray comes, and only then; what was not made goes on with the list of the cell above.
+A pair whose lists are alike shares one, and so does a part whose list is the same as that of the cell above.
 """
 
 import math
@@ -19,13 +19,15 @@ HELPS = 0.9
 TRIES = 8
 #: A cell is divided along an axis whose extent is at least this part of the largest one.
 WIDE = 0.5
-#: How much more extents of origins count than those of directions: rays from one point are told apart by directions alone.
+#: How much more extents of origins count than those of directions:
+#: rays from one point are told apart by directions alone.
 ORIGINS = 2.0
 #: Coordinates that each further set of cells, for rays from farther away, allows for: so many times as large ...
 STEP = 2.0**8
 #: ... from this many times the scene's on; and how many sets there are.
 REACH, SETS = 2.0**4, 9
-#: Bytes of a cell without its list: the object, twelve numbers in two tuples, its places in two dicts, its axes and parts.
+#: Bytes of a cell without its list: the object, twelve numbers in two tuples,
+#: its places in two dicts, its axes and parts.
 CELL = 800
 #: Bytes of the bounds of a primitive.
 BOUNDS = 240

@@ -1,8 +1,8 @@
 """The directory in the image plane: which primitives primary rays can meet, known before they are traced.
 
-The camera's window is divided adaptively into cells. A cell lists the primitives that are seen in it, nearest first; what
-lies behind a primitive that covers the whole cell is not listed. Where one is left, which is most often so in a picture
-of few large primitives, the ray needs no search at all (compare Weghorst, Hooper and Greenberg 1984).
+The camera's window is divided adaptively into cells. A cell lists the primitives that are seen in it, nearest first;
+what lies behind a primitive that covers the whole cell is not listed. Where one is left, which is most often so in a
+picture of few large primitives, the ray needs no search at all (compare Weghorst, Hooper and Greenberg 1984).
 """
 
 import math
@@ -64,7 +64,8 @@ class ImageDirectory(Handing):
         return -z - LOSS * abs(z)
 
     def _seen(self, ray):
-        """Where the ray passes the window, and its length along the viewing axis; None unless it comes from the camera."""
+        """Where the ray passes the window, and its length along the viewing axis; None unless it comes from the camera.
+        """
         view = self.view
         x, y, z = view.direction(ray.d)
         if not z > 0.0:

@@ -16,7 +16,8 @@ from .quadtree import divide, divide_evenly, quads
 from .second import Handing
 from .view import LOSS, View
 
-#: How far beside a light a ray may pass, or beyond it end, relative to the largest coordinate; well within the footprints' own rounding.
+#: How far beside a light a ray may pass, or beyond it end, relative to
+#: the largest coordinate; well within the footprints' own rounding.
 BESIDE = 2.0**-46
 #: Half the edge of the cubes that are drawn: relative to the scene, or to its distance if that is more.
 SHOWN, SHOWN_AWAY = 0.02, 0.25
@@ -46,7 +47,8 @@ class LightBuffer(Handing):
             along = resolution or min(64, max(2, math.ceil(math.sqrt(len(self.primitives) / 6))))
             self.divide = lambda footprints, *occludes: divide_evenly(footprints, along, z_buffer, *occludes)
         self.max_bytes, self.buffers = max_bytes, {}
-        # Of each buffer: cells, empty ones, entries, bytes; and of all together, so that of thousands of lights each is counted once.
+        # Of each buffer: cells, empty ones, entries, bytes; and of all together,
+        # so that of thousands of lights each is counted once.
         self._used, self._total = {}, [0, 0, 0, 0]
         self.extra = 2.0 * max(abs(c) for p in self.primitives for c in (*p.lo, *p.hi))
         self.lights = [light for light in getattr(self.scene, "lights", ()) if _fits(light)]
@@ -89,7 +91,9 @@ class LightBuffer(Handing):
         return True
 
     def cells(self):
-        """The buffers of the first lights in place: direction cubes around lights, the sun's window in front of the scene."""
+        """The buffers of the first lights in place: direction cubes around lights,
+        the sun's window in front of the scene.
+        """
         if not self.primitives:
             return super().cells()
         windows = []
@@ -128,7 +132,8 @@ class LightBuffer(Handing):
                                        "Raise max_bytes, lower the resolution, or name another technique for shadow rays."))
 
     def _count(self, number, own):
-        """Take what a buffer holds now into what all hold, in place of what it held before; None for one that is gone."""
+        """Take what a buffer holds now into what all hold, in place of what it held before; None for one that is gone.
+        """
         before = self._used.pop(number, (0, 0, 0, 0))
         if own is not None:
             self._used[number] = own

@@ -62,8 +62,8 @@ def divide(footprints, occludes=lambda footprint, low, high: True, area=(-1.0, 1
     ----------
     footprints : list of Footprint
     occludes : callable
-        ``occludes(footprint, low, high)``: whether a primitive that covers a cell with nearness between `low` and `high`
-        surely ends every ray there.
+        ``occludes(footprint, low, high)``: whether a primitive that covers a
+        cell with nearness between `low` and `high` surely ends every ray there.
 
     Returns
     -------

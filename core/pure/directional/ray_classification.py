@@ -1,12 +1,14 @@
-"""Ray classification (Arvo and Kirk 1987): a ray is a point in five dimensions, and cells of that space list primitives.
+"""Ray classification (Arvo and Kirk 1987): a ray is a point
+in five dimensions, and cells of that space list primitives.
 
-A ray's origin has three coordinates and its direction two; cells are boxes in these five, so each is a beam, and its list
-holds what the beam may hit. A ray finds its cell, and need only be tested against that list. Cells are divided when a ray
-comes that finds too long a list; nothing is made for rays that never come. The lists are in the order in which primitives
-begin along the dominant axis of the directions, so a ray is done when the next one begins behind the nearest hit.
+A ray's origin has three coordinates and its direction two; cells are boxes in these five, so each is a beam, and its
+list holds what the beam may hit. A ray finds its cell, and need only be tested against that list. Cells are divided
+when a ray comes that finds too long a list; nothing is made for rays that never come. The lists are in the order in
+which primitives begin along the dominant axis of the directions, so a ray is done when the next one begins behind the
+nearest hit.
 
-Where a ray enters the scene's box is its origin here, so rays may come from anywhere. Given a list of scenes, frames of an
-animation with the same primitives, cells have time as a sixth dimension: one build serves all frames.
+Where a ray enters the scene's box is its origin here, so rays may come from anywhere. Given a list of scenes,
+frames of an animation with the same primitives, cells have time as a sixth dimension: one build serves all frames.
 """
 
 import math
@@ -78,7 +80,8 @@ class RayClassification(Structure):
         Returns
         -------
         Structure
-            To be asked as any other, and to be given to :func:`~rayscope.core.trace` as ``index`` with the frame's scene.
+            To be asked as any other, and to be given to
+            :func:`~rayscope.core.trace` as ``index`` with the frame's scene.
         """
         if not 0 <= frame < len(self.frames):
             raise SceneError(f"ray-classification: there is no frame {frame}; it was built over {len(self.frames)}, from 0 on.")
@@ -107,7 +110,9 @@ class RayClassification(Structure):
             self._say_so()
 
     def _enter(self, frame, ray, t_max):
-        """Where a ray enters the scene's box: t, dominant axis, M to FRAME, what its positions may be off by; None for a miss."""
+        """Where a ray enters the scene's box: t, dominant axis, M to FRAME,
+        what its positions may be off by; None for a miss.
+        """
         slack = ROUNDING * max(*map(abs, ray.o), self.bounds.extent)
         begin, end = ray.t_min, t_max
         for o, d, inverse, low, high in zip(ray.o, ray.d, ray.inverse, *self.bounds.box):
@@ -144,7 +149,8 @@ class RayClassification(Structure):
             near, far = max(box[face], m) - m, min(-box[face ^ 1], limit) - m
             if box[face] > limit or -box[face ^ 1] < m - slack:
                 continue
-            # Between where the box begins and where it ends along the axis, the ray's b and c must come between the box's.
+            # Between where the box begins and where it ends along the axis,
+            # the ray's b and c must come between the box's.
             for place, slope, low in ((b, u, column_b), (c, v, column_c)):
                 one, two = place + slope * near, place + slope * far
                 if max(one, two) < box[low] - slack or min(one, two) > slack - box[low + 1]:

@@ -1,13 +1,13 @@
 """Ray coherence (Ohta and Maekawa 1987): from every primitive, lists of what can be met in each direction.
 
-Every primitive has a bounding sphere. A ray that starts in sphere 1 (centre S1, radius R1) and meets sphere 2 makes an angle with the
-line from S1 to S2 whose sine is (R1 + R2) / |S1 - S2| at most; spheres that overlap allow every direction. A direction cube in S1
-therefore lists, for each of its cells, the spheres whose angle reaches into the cone around that cell, and the lights likewise, by
-distance: no ray from anywhere in sphere 1 meets sphere 2 before |S1 - S2| - R1 - R2, and none that ends at a light gets further than
-the light's entry.
+Every primitive has a bounding sphere. A ray that starts in sphere 1 (centre S1, radius R1) and meets sphere 2 makes an
+angle with the line from S1 to S2 whose sine is (R1 + R2) / |S1 - S2| at most; spheres that overlap allow every
+direction. A direction cube in S1 therefore lists, for each of its cells, the spheres whose angle reaches into the cone
+around that cell, and the lights likewise, by distance: no ray from anywhere in sphere 1 meets sphere 2 before |S1 - S2|
+- R1 - R2, and none that ends at a light gets further than the light's entry.
 
-A list is made when the first ray needs it. A ray of which it is not known which primitive it leaves, or that does not start in its
-sphere, is handed over.
+A list is made when the first ray needs it. A ray of which it is not known which
+primitive it leaves, or that does not start in its sphere, is handed over.
 """
 
 import math
@@ -21,7 +21,8 @@ from .second import Handing
 
 #: Rounding, relative.
 ROUNDING = 2.0**-40
-#: Spheres are larger by so much, relative to the largest coordinate: far more than rounding, as rays may start a little off what they leave.
+#: Spheres are larger by so much, relative to the largest coordinate: far
+#: more than rounding, as rays may start a little off what they leave.
 OFF = 2.0**-15
 #: Bytes of an entry, about.
 ENTRY = 112
@@ -37,7 +38,8 @@ class RayCoherence(Handing):
     spheres : list of (centre, radius)
         Of all primitives, then of all lights that have a place.
     lists : dict
-        (primitive, cell) -> list of (distance, number), ascending, or None where it would be too long; the one used last at the end.
+        (primitive, cell) -> list of (distance, number), ascending, or
+        None where it would be too long; the one used last at the end.
     """
 
     follows = True
@@ -106,7 +108,9 @@ class RayCoherence(Handing):
         return (face * along + j) * along + i
 
     def list(self, item, cell, measured=False):
-        """What rays can meet that leave a primitive through a cell of its cube; made if need be. None where that is too much."""
+        """What rays can meet that leave a primitive through a cell of its cube;
+        made if need be. None where that is too much.
+        """
         key = item, cell
         if key not in self.lists:
             entries = self._made(item, cell, self.reach)

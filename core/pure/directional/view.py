@@ -1,11 +1,12 @@
 """A window onto the scene, and where in it primitives are seen: their footprints.
 
 A view is a linear map from world space to (x, y, z): a point is seen at u = x / z, v = y / z in a perspective view, at
-u = x, v = y in a parallel one; the window is the square from -1 to 1. All rays that pass through one point of the window
-share u and v, so the primitives that such a ray can meet are those whose footprint has that point.
+u = x, v = y in a parallel one; the window is the square from -1 to 1. All rays that pass through one point of
+the window share u and v, so the primitives that such a ray can meet are those whose footprint has that point.
 
-A footprint is never too small. A corner is off by at most `ROUNDING` of the numbers that it is made from; that is far more
-than what the views' arithmetic and the tests of primitives lose, and corners are taken as if they were anywhere within it.
+A footprint is never too small. A corner is off by at most `ROUNDING` of the numbers
+that it is made from; that is far more than what the views' arithmetic and the tests
+of primitives lose, and corners are taken as if they were anywhere within it.
 """
 
 import itertools
@@ -84,7 +85,9 @@ class View:
         return x - self.shift[0], y - self.shift[1], z
 
     def footprints(self, primitives, progress=no_progress):
-        """Where primitives are seen, those that the window shows; triangles that are a face together share their outline."""
+        """Where primitives are seen, those that the window shows;
+        triangles that are a face together share their outline.
+        """
         found = []
         for item, primitive in enumerate(primitives):
             found.append(self.footprint(item, primitive))
@@ -164,7 +167,8 @@ class Footprint:
         self.corners, self.beside = (), None
 
     def add_edges(self, points, perspective):
-        """Edges and plane of a triangle: the rows of the inverse of the matrix of its corners (Olano and Greer 1997)."""
+        """Edges and plane of a triangle: the rows of the inverse of the matrix of its corners (Olano and Greer 1997).
+        """
         corners = points if perspective else [(x, y, 1.0) for x, y, _ in points]
         normals = [cross(corners[(k + 1) % 3], corners[(k + 2) % 3]) for k in range(3)]
         det = dot(corners[0], normals[0])

@@ -1,10 +1,10 @@
 """Beams: projective maps from the world to the picture.
 
-A beam's map takes a point of the world to (x, y, nearness) in the picture: nearness is the inverse of depth from an eye,
-or minus depth in parallel projection; either way it is linear on every plane. A mirror's beam has a map that reflects
-the world first, so that in the picture all beams are straight and have the same axis (Heckbert and Hanrahan 1984).
-Glass moves the world beyond it nearer or farther: exact for the ray in the middle of the beam, and an approximation, the
-paraxial one, for those beside it.
+A beam's map takes a point of the world to (x, y, nearness) in the picture: nearness is the inverse of depth from an
+eye, or minus depth in parallel projection; either way it is linear on every plane. A mirror's beam has a map that
+reflects the world first, so that in the picture all beams are straight and have the same axis (Heckbert and Hanrahan
+1984). Glass moves the world beyond it nearer or farther: exact for the ray in the middle of the beam, and an
+approximation, the paraxial one, for those beside it.
 
 Matrices are lists of rows; a plane is (normal x, y, z, distance), its height over it normal . x + distance.
 """
@@ -120,7 +120,8 @@ def eye_beam(camera, size, origin):
 
 
 def light_beams(light, number, position, lo, hi):
-    """Beams from a light at `position` over a scene's box: six through a cube's sides, or the parallel one of the sun."""
+    """Beams from a light at `position` over a scene's box: six through a cube's sides, or the parallel one of the sun.
+    """
     half = 0.5 * LIGHT
     if light.kind != "sun":
         beams = []

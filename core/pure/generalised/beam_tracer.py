@@ -1,10 +1,10 @@
 """Pictures from beams: every pixel is the sum, by area, of the fragments that lie in it.
 
-What of a surface is seen in a pixel has the colour of its centre; what of it is lit by a light is shaded at four points,
-which is exact up to the third order. Visibility, mirrors and the shadows of lights without extent are exact, refraction
-is paraxial. The rest is sampled by rays, several a pixel: what lies beyond the boxes around primitives that are no
-polygons, what is seen in smooth-shaded (curved) mirrors and in glass at grazing angles, soft shadows, and light that has
-come through glass.
+What of a surface is seen in a pixel has the colour of its centre; what of it is lit by a light is shaded at four
+points, which is exact up to the third order. Visibility, mirrors and the shadows of lights without extent are exact,
+refraction is paraxial. The rest is sampled by rays, several a pixel: what lies beyond the boxes around primitives that
+are no polygons, what is seen in smooth-shaded (curved) mirrors and in glass at grazing angles, soft shadows, and light
+that has come through glass.
 """
 
 import math

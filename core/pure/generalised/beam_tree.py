@@ -163,7 +163,9 @@ class BeamTree:
         return weight
 
     def _onward(self, fragments):
-        """The cross-sections, (beam, source, points) each, of the beams that surfaces send on; these are added to `beams`."""
+        """The cross-sections, (beam, source, points) each, of the
+        beams that surfaces send on; these are added to `beams`.
+        """
         groups, wholes = {}, {}
         for f in fragments:
             if self.knows(f.surface):

@@ -150,9 +150,11 @@ def inside(planes, thing):
 
 
 def outline(beam, points, plane, turn):
-    """Lines around a face in the picture of a beam, inside positive, distances in pixels; and its corners (x w, y w, w).
+    """Lines around a face in the picture of a beam, inside positive,
+    distances in pixels; and its corners (x w, y w, w).
 
-    No lines for a face seen edge-on, narrower than lines are told apart, or outside of the half-spaces that the beam is confined to.
+    No lines for a face seen edge-on, narrower than lines are told apart,
+    or outside of the half-spaces that the beam is confined to.
     """
     sight = beam.sight(plane)
     if abs(sight) <= EDGE_ON:

@@ -1,8 +1,8 @@
 """Beams of polygonal cross-section (Heckbert and Hanrahan 1984): pictures of polygons without samples.
 
-The eye's beam is the view pyramid. It goes through a BSP tree of the scene's polygons from front to back; what each face
-cuts out of it is visible, exactly. Mirrors reflect the beam that meets them, glass refracts it in the paraxial
-approximation; lights cast beams for their shadows. Rays by themselves are handed to a bvh.
+The eye's beam is the view pyramid. It goes through a BSP tree of the scene's polygons from front to back;
+what each face cuts out of it is visible, exactly. Mirrors reflect the beam that meets them, glass refracts it
+in the paraxial approximation; lights cast beams for their shadows. Rays by themselves are handed to a bvh.
 """
 
 from collections import Counter
@@ -30,7 +30,8 @@ class Beams(CastsBeams, Handing):
         self.hand_over(query)
 
     def cells(self):
-        """The beam tree, as deep as the parameter `levels` says: a cell from each mirror, or the eye, to what is seen."""
+        """The beam tree, as deep as the parameter `levels` says: a cell from each mirror, or the eye, to what is seen.
+        """
         camera = getattr(self.scene, "camera", None)
         if camera is None or not self.primitives:
             return super().cells()

@@ -1,8 +1,8 @@
 """Clipping convex polygons (Sutherland and Hodgman 1974), such that areas add up.
 
-A corner where an edge crosses a line is computed once, from the nearer end, and belongs to what lies on either side: the
-two parts of a polygon have its area, to rounding, and neighbours that share an edge share the cut. What lies on the line
-belongs to both sides, as a part without area; what is nearer to it than a tolerance can be taken to lie on it.
+A corner where an edge crosses a line is computed once, from the nearer end, and belongs to what lies on either side:
+the two parts of a polygon have its area, to rounding, and neighbours that share an edge share the cut. What lies on the
+line belongs to both sides, as a part without area; what is nearer to it than a tolerance can be taken to lie on it.
 
 A polygon is a list of corners, counter-clockwise. The corners may be points of the plane or homogeneous, or points of
 space.
@@ -111,8 +111,8 @@ def second_moments(polygon, origin):
 def nodes(centre, spread):
     """Four points of equal weight at which a function's mean is that over a region, up to the function's third order.
 
-    `spread` are the region's means of x x, x y, y y, seen from its centre: the points are as far to either side along two
-    directions as makes their spread the region's.
+    `spread` are the region's means of x x, x y, y y, seen from its centre: the points
+    are as far to either side along two directions as makes their spread the region's.
     """
     (x, y), (xx, xy, yy) = centre, spread
     a = math.sqrt(max(xx, 0.0))

@@ -6,7 +6,8 @@ from ...vectors import cross, dot, minus
 from .half_planes import covered
 from .outlines import Outline
 
-#: What rounding leaves of the volume between the apex and a triangle whose plane goes through it, by products of its extents: at most.
+#: What rounding leaves of the volume between the apex and a triangle
+#: whose plane goes through it, by products of its extents: at most.
 VOLUME = 2.0**-49
 
 

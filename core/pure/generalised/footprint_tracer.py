@@ -3,10 +3,10 @@
 All else is Whitted's tracer: each visible piece is shaded, at its middle, as the hit of a ray that weighs as much as
 its share; what is left sees the surroundings.
 
-The parameter ``samples`` says how many rays a whole pixel is worth. A cone that reaches what cannot be tested as a whole
-becomes as many rays as its weight in the pixel is worth, at least one, spread over it at random. So does a cone that is
-worth no more than a ray, and one that reaches a crowd of primitives, with more rays. The work in a pixel is bounded
-for that reason, however many surfaces rays are sent on by, and the expected value is the mean over the cone.
+The parameter ``samples`` says how many rays a whole pixel is worth. A cone that reaches what cannot be tested as a
+whole becomes as many rays as its weight in the pixel is worth, at least one, spread over it at random. So does a cone
+that is worth no more than a ray, and one that reaches a crowd of primitives, with more rays. The work in a pixel is
+bounded for that reason, however many surfaces rays are sent on by, and the expected value is the mean over the cone.
 """
 
 import math
@@ -52,7 +52,8 @@ class ConePath(Path):
         return cls(cone.o, cone.d, cone.t_min, cone.t_max, weight, depth, kind, key, cone.leaving, cone)
 
     def narrowed(self, s, t, share, rank):
-        """The ray through (s, t), with as much of the cone's area about it as its share; `rank` tells it from others."""
+        """The ray through (s, t), with as much of the cone's area about it as its share; `rank` tells it from others.
+        """
         o, d = self.cone.ray(s, t)
         width = math.sqrt(share)
         cone = replace(self.cone, o=o, d=d, e=times(width, self.cone.e), f=times(width, self.cone.f))

@@ -4,7 +4,8 @@ from ...scene.footprints import triangulated
 
 
 def pieces_of(primitive, supported):
-    """The pieces of a primitive: triangles (three corners each), or the sphere itself; none where it is not supported."""
+    """The pieces of a primitive: triangles (three corners each), or the sphere itself; none where it is not supported.
+    """
     if primitive.KIND not in supported:
         return []
     if primitive.KIND == "sphere":

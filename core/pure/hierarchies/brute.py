@@ -9,7 +9,9 @@ class Brute(Structure):
     """No structure at all."""
 
     def build(self, progress, triangle_test="watertight"):
-        """Nothing to build but the box around everything, for whoever draws it, and what the triangles' test wants prepared."""
+        """Nothing to build but the box around everything, for whoever draws it,
+        and what the triangles' test wants prepared.
+        """
         self.primitives = tested(self.primitives, triangle_test)
         self.figures["memory"] = memory_of(*(p.data for p in self.primitives if isinstance(p, Tested)))
         self.lo = tuple(map(min, *(p.lo for p in self.primitives), (float("inf"),) * 3))

@@ -1,4 +1,5 @@
-"""Incremental construction (Goldsmith and Salmon 1987): primitives are inserted one after the other, each where it costs least.
+"""Incremental construction (Goldsmith and Salmon 1987): primitives
+are inserted one after the other, each where it costs least.
 
 A ray that meets a volume tests all that is in it. So what a tree costs is the sum over its volumes of area x (tests of
 sub-volumes + tests of primitives). A primitive that has come to a volume

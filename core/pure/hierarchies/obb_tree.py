@@ -1,5 +1,6 @@
-"""OBB tree (Gottschalk, Lin and Manocha 1996): halved where the centres' mean is, across the longest axis of the oriented
-box; across the next one where that leaves one side empty."""
+"""OBB tree (Gottschalk, Lin and Manocha 1996): halved where the centres' mean is, across
+the longest axis of the oriented box; across the next one where that leaves one side empty.
+"""
 
 from ..bounds.obb import Obb
 from . import topdown

@@ -1,6 +1,7 @@
 """The flat list, done efficiently: the bounding volumes that the ray meets, sorted by where it enters them.
 
-Primitives are tested in that order, until a hit is nearer than where the next volume begins. (Not: until the first hit.)
+Primitives are tested in that order, until a hit is nearer
+than where the next volume begins. (Not: until the first hit.)
 """
 
 import math

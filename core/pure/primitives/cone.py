@@ -63,7 +63,8 @@ class Cone(UnitShape):
         if a > 0.0:
             side_in, side_out = first, second
         elif a < 0.0:
-            # Before the first or after the second crossing, in the nappe where w grows: the other one lies beyond z = 1.
+            # Before the first or after the second crossing, in the
+            # nappe where w grows: the other one lies beyond z = 1.
             side_in, side_out = (second, math.inf) if dw > 0.0 else (-math.inf, first)
         elif b == 0.0:
             if not c <= 0.0:
@@ -135,7 +136,9 @@ class Cone(UnitShape):
         return w[0] * scale, w[1] * scale, 1.0 if top else 0.0
 
     def shrink(self, lo, hi):
-        """The box leaves of the axis only heights whose discs reach into it: what is around these is the frustum between two."""
+        """The box leaves of the axis only heights whose discs reach into it:
+        what is around these is the frustum between two.
+        """
         begin, end, radii, slacks = 0.0, 1.0, [], []
         for row, c, l, h in zip(self.matrix, self.origin, lo, hi):
             radius = math.sqrt(row[0] * row[0] + row[1] * row[1])

@@ -151,7 +151,8 @@ class Tree(Primitive):
         return cover
 
     def inscribed_box(self):
-        """The 8 corners of a box within the combination: the largest of the cover, or of its eighths, grown side by side.
+        """The 8 corners of a box within the combination: the largest of the cover,
+        or of its eighths, grown side by side.
 
         None where none was found.
         """

@@ -1,4 +1,5 @@
-"""The instance: one structure over a mesh, reached through an object's matrix. The ray is taken into the mesh's space."""
+"""The instance: one structure over a mesh, reached through an object's matrix. The ray is taken into the mesh's space.
+"""
 
 import itertools
 

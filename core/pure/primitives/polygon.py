@@ -38,7 +38,8 @@ def distance(p, q):
 
 
 def inside(sheared):
-    """Whether a line passes through a polygon, or through its edge; the corners as :meth:`Polygon.sheared` tells them."""
+    """Whether a line passes through a polygon, or through its edge; the corners as :meth:`Polygon.sheared` tells them.
+    """
     odd = False
     x, y, _ = sheared[-1]
     for x1, y1, _ in sheared:
@@ -142,10 +143,10 @@ class Polygon(Primitive):
     def inscribed_box(self):
         """The 8 corners of a flat box, each of four twice: a large quadrilateral within. None where there is no room.
 
-        Along the plane's two axes it is a rectangle with the proportions of the polygon's box, grown around a point until it
-        meets an edge: the best of those in the widest stretches inside at some heights. A trifle smaller, so that
-        rounding does not put a corner outside: seen at any angle that is not nearly edge-on, what passes through it meets
-        the polygon.
+        Along the plane's two axes it is a rectangle with the proportions of the polygon's box, grown around a point
+        until it meets an edge: the best of those in the widest stretches inside at some heights. A trifle smaller, so
+        that rounding does not put a corner outside: seen at any angle that is not nearly edge-on, what passes through
+        it meets the polygon.
         """
         ku, kv, kw = self.axes
         half = [0.5 * (self.hi[k] - self.lo[k]) for k in (ku, kv)]

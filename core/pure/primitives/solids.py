@@ -103,7 +103,8 @@ class UnitShape(Primitive):
     # The kind's own; o, d, p are triples in unit space.
 
     def crossings(self, o, d):
-        """Where a line meets the unit shape: (t, face) of the first, (t, face) of the second; t is NaN where there is none.
+        """Where a line meets the unit shape: (t, face) of the first,
+        (t, face) of the second; t is NaN where there is none.
 
         Of a closed shape these are where the line enters and leaves, along the whole line.
         """
@@ -134,7 +135,9 @@ class UnitShape(Primitive):
         raise NotImplementedError
 
     def inner(self):
-        """Corners (lo, hi) of a large box within the unit shape; None where a line through it need not meet the surface."""
+        """Corners (lo, hi) of a large box within the unit shape;
+        None where a line through it need not meet the surface.
+        """
         raise NotImplementedError
 
     def shrink(self, lo, hi):
@@ -219,7 +222,9 @@ class UnitShape(Primitive):
         return True
 
     def inscribed_box(self):
-        """The 8 corners of a parallelepiped within the solid: what passes through it meets the solid. None for an open one."""
+        """The 8 corners of a parallelepiped within the solid: what
+        passes through it meets the solid. None for an open one.
+        """
         inner = self.inner()
         if inner is None:
             return None
@@ -232,8 +237,8 @@ class UnitShape(Primitive):
     def clip(self, lo, hi):
         """The box of the part inside a box, the solid's inside included.
 
-        It is as tight as the kind's ``shrink`` tells: exact for polytopes; of round solids, wherever one side of the box
-        cuts at a time.
+        It is as tight as the kind's ``shrink`` tells: exact for polytopes;
+        of round solids, wherever one side of the box cuts at a time.
         """
         if not self.overlaps(lo, hi):
             return NOWHERE

@@ -56,7 +56,9 @@ class Sphere(UnitShape):
         return unit(w)
 
     def shrink(self, lo, hi):
-        """One coordinate between limits leaves of each other one what the ellipse at the nearer limit to its greatest place has."""
+        """One coordinate between limits leaves of each other one what
+        the ellipse at the nearer limit to its greatest place has.
+        """
         m, c = self.matrix, self.origin
         lo, hi = list(lo), list(hi)
         for a in range(3):

@@ -15,7 +15,8 @@ from . import Primitive
 ROUNDING = 2.0**-53
 #: gamma(7): relative error of a point interpolated from three vertices (Pharr et al., PBR 4th ed., 6.8.5).
 GAMMA_7 = 7 * ROUNDING / (1 - 7 * ROUNDING)
-#: How far inscribed boxes stay away from edges, relative to the coordinates; 8 makes up for components instead of lengths.
+#: How far inscribed boxes stay away from edges, relative to the coordinates;
+#: 8 makes up for components instead of lengths.
 TRIM = 8 * 2.0**-40
 
 
@@ -87,8 +88,9 @@ class Triangle(Primitive):
     def intersect(self, ray, t_far, watch=None):
         """Woop, Benthin and Wald, "Watertight Ray/Triangle Intersection", 2013.
 
-        Operations: 28 multiplications, 29 additions, 4 divisions, 8 comparisons (of a hit in front; signs are free; 7, 5, 0, 1 of them
-        decide whether rounding matters in the edge functions, 3, 2, 1, 2 whether it does in t, see :mod:`~rayscope.core.scene.exact`).
+        Operations: 28 multiplications, 29 additions, 4 divisions, 8 comparisons (of a hit in front;
+        signs are free; 7, 5, 0, 1 of them decide whether rounding matters in the edge functions, 3,
+        2, 1, 2 whether it does in t, see :mod:`~rayscope.core.scene.exact`).
         """
         kx, ky, kz = ray.axes
         ox, oy, oz = ray.o[kx], ray.o[ky], ray.o[kz]
@@ -160,8 +162,8 @@ class Triangle(Primitive):
         """The 8 corners of a flat box, each of four twice: the largest parallelogram within, half the triangle.
 
         None where there is no room.
-        A trifle smaller, so that rounding does not put a corner outside: seen at any angle that is not nearly edge-on, what
-        passes through it meets the triangle.
+        A trifle smaller, so that rounding does not put a corner outside: seen at any
+        angle that is not nearly edge-on, what passes through it meets the triangle.
         """
         a = self.a
         e, f = [y - x for x, y in zip(a, self.b)], [y - x for x, y in zip(a, self.c)]

@@ -113,8 +113,8 @@ class KdTree(CellTree):
                 what = end & 1
                 right -= what == END
                 if low < end >> 1 < high:
-                    # The lower cell has the part face + r of the area, r = below + 2 part, and the upper one the part 1 - r:
-                    # the cost is left (face + r) + right (1 - r), put so that both cores round alike.
+                    # The lower cell has the part face + r of the area, r = below + 2 part, and the upper one the
+                    # part 1 - r: the cost is left (face + r) + right (1 - r), put so that both cores round alike.
                     below = (end - 2 * low - 2) * part
                     cost = (below - (1.0 - 2.0 * part)) * (left - right) + left * (1.0 + face)
                     if left == 0 or right == 0:

@@ -1,4 +1,5 @@
-"""What a ray does in the cells that it walks through: where it is among them, tests, mailboxes, marks on shared lists."""
+"""What a ray does in the cells that it walks through: where it is among them, tests, mailboxes, marks on shared lists.
+"""
 
 
 def shared(lists):

@@ -89,7 +89,8 @@ class MacroGrid(Grid):
         return reach
 
     def cells(self):
-        """The whole box, every cell, and a few of the regions that cover the empty ones; a region's count is its cells."""
+        """The whole box, every cell, and a few of the regions that cover the empty ones; a region's count is its cells.
+        """
         if not self.primitives:
             return super().cells()
         inside = [

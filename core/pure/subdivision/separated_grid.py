@@ -70,7 +70,8 @@ class SeparatedGrid(Grid):
         return slabs * (n // 8 + 32) if self.parameters["intersect"] == "bits" else 56 * slabs + 8 * len(self.axes) * n
 
     def _surplus(self):
-        """References that intersecting lists adds to those of exact lists, as a part of these; from a sample of them."""
+        """References that intersecting lists adds to those of exact lists, as a part of these; from a sample of them.
+        """
         boxes = [
             [range(self._index(a, p.lo[a] - self.margin), self._index(a, p.hi[a] + self.margin) + 1) for a in range(3)]
             for p in self.primitives

@@ -27,6 +27,8 @@ class Probe:
         return self.structure.occluded_ray(Ray(o, d, 0.0, t_max, leaving), counter), counter
 
     def shadowed(self, o, d, t_max, leaving, through):
-        """Whether something opaque is in the way, else whether something is that lets light through; and a Counter or None."""
+        """Whether something opaque is in the way, else whether
+        something is that lets light through; and a Counter or None.
+        """
         counter = Counter() if self.count else None
         return self.structure.shadowed_ray(Ray(o, d, 0.0, t_max, leaving), through, counter), counter

@@ -45,7 +45,8 @@ def pair(key, dimension, n=1, k=0):
 
 
 def _scrambled(x, seed):
-    """A permutation that flips each bit by a hash of the bits below it (Laine and Karras 2011, constants by Vegdahl)."""
+    """A permutation that flips each bit by a hash of the bits below it (Laine and Karras 2011, constants by Vegdahl).
+    """
     x ^= x * 0x3D20ADEA & POINT
     x = (x + seed) * (seed >> 16 | 1) & POINT
     x ^= x * 0x05526C56 & POINT
