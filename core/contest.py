@@ -7,8 +7,8 @@ import numpy as np
 from .fast.rays import left, part
 from .hits import Hits
 
-#: Part of what rays will still take, about, that a trial, what is built for it, and all that earlier trials lost may come
-#: to: whatever comes of it, little is lost.
+#: Part of what rays will still take, about, that a trial, what is built for it, and all that earlier trials lost may
+#: come to: whatever comes of it, little is lost.
 SHARE = 0.04
 #: Rays have taken so long before the first trial: then it is known what one takes. Seconds.
 START = 0.02
