@@ -65,7 +65,8 @@ def build(source, target):
     """Blender's own builder, which ships with bpy and runs without it."""
     (bpy,) = find_spec("bpy").submodule_search_locations
     (script,) = Path(bpy).glob("*/scripts/addons_core/bl_pkg/cli/blender_ext.py")
-    subprocess.run([sys.executable, script, "build", "--source-dir", source, "--output-filepath", target], check=True, stdout=subprocess.DEVNULL)
+    subprocess.run([sys.executable, script, "build", "--source-dir", source, "--output-filepath", target],
+                   check=True, stdout=subprocess.DEVNULL)
     print(f"{target.relative_to(ROOT)}  {target.stat().st_size / 1e6:.1f} MB", flush=True)
 
 
@@ -86,7 +87,8 @@ def main():
                 continue
             names = [f"./wheels/{wheel.name}" for wheel in sorted(wheels.glob("*.whl"))]
             manifest = tree / "blender_manifest.toml"
-            manifest.write_text(manifest.read_text().replace("\n[permissions]", f"\nplatforms = {[platform]!r}\nwheels = {names!r}\n\n[permissions]", 1))
+            own = f"\nplatforms = {[platform]!r}\nwheels = {names!r}\n\n[permissions]"
+            manifest.write_text(manifest.read_text().replace("\n[permissions]", own, 1))
             build(tree, DIST / f"rayscope-{version}-{platform.replace('-', '_')}.zip")
     for line in left_out:
         print(f"LEFT OUT: {line.upper()}")

@@ -110,7 +110,8 @@ def mesh_fault(mesh):
     balance = np.bincount(place.reshape(-1), np.where(start < end, 1.0, -1.0), minlength=len(edges))
     boundary = int((sides == 1).sum())
     if boundary:
-        return f"it is open: {boundary} boundary edge{'s' if boundary > 1 else ''}; close it, for instance with Mesh > Clean Up > Fill Holes"
+        edges = f"{boundary} boundary edge{'s' if boundary > 1 else ''}"
+        return f"it is open: {edges}; close it, for instance with Mesh > Clean Up > Fill Holes"
     if (sides > 2).any():
         return f"it is not manifold: {int((sides > 2).sum())} edges have more than two faces; remove inner faces"
     if balance.any():

@@ -99,7 +99,8 @@ def test_cells_said_to_be_covered_by_a_face_are(perspective):
             joined += foot.beside is not None
             for at in np.flatnonzero(low > -np.inf):
                 found += 1
-                a, b = (c[at] + half[at] * np.concatenate([rng.uniform(-1, 1, 20), s]) for c, s in ((u, [-1, -1, 1, 1]), (v, [-1, 1, -1, 1])))
+                a, b = (c[at] + half[at] * np.concatenate([rng.uniform(-1, 1, 20), s])
+                        for c, s in ((u, [-1, -1, 1, 1]), (v, [-1, 1, -1, 1])))
                 inverse = np.linalg.inv(view.rows)
                 if perspective:
                     o, d = np.broadcast_to(eye, (24, 3)), (inverse @ np.stack([a, b, np.ones(24)])).T

@@ -30,7 +30,8 @@ def balls(primitives):
 
 def _balls(primitives):
     """The same, calculated."""
-    parts = [_of_kind(own, primitives.lo[a:b], primitives.hi[a:b]) for own, a, b in zip(primitives.kinds, primitives.starts, primitives.starts[1:])]
+    parts = [_of_kind(own, primitives.lo[a:b], primitives.hi[a:b])
+             for own, a, b in zip(primitives.kinds, primitives.starts, primitives.starts[1:])]
     centre, radius, count = (np.concatenate(c, axis=-1) for c in zip(*parts))
     return centre, radius, np.concatenate([[0], np.cumsum(count)])
 

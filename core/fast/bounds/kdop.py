@@ -134,7 +134,8 @@ def _lines(k):
         others = np.isin(np.arange(k), (f, g), invert=True)
         inner = (hf * gg > hg * fg) & (hg * ff > hf * fg)
         cuts = {}
-        for name, which in (("ends", speed > 0.0), ("begins", speed < 0.0), ("between", (speed == 0.0) & inner), ("along", (speed == 0.0) & ~inner)):
+        still = speed == 0.0
+        for name, which in (("ends", speed > 0.0), ("begins", speed < 0.0), ("between", still & inner), ("along", still & ~inner)):
             h = np.flatnonzero(which & others)
             cuts[name] = h, hf[h, None], hg[h, None], np.where(speed[h] == 0.0, 1.0, speed[h])[:, None]
         lines.append((f, g, ff, gg, fg, float(e @ e), cuts))

@@ -59,7 +59,8 @@ class Obbs(Volumes):
 
     def projected(self, direction):
         x, y, z = direction
-        return box_shadow(self.own[12:] - self.own[9:12], np.abs([self.own[k] * x + self.own[k + 1] * y + self.own[k + 2] * z for k in (0, 3, 6)]))
+        cosines = [self.own[k] * x + self.own[k + 1] * y + self.own[k + 2] * z for k in (0, 3, 6)]
+        return box_shadow(self.own[12:] - self.own[9:12], np.abs(cosines))
 
     def boxes(self):
         axes = self.own[:9].reshape(3, 3, -1)

@@ -139,7 +139,9 @@ def _of_triangles(view, corners):
         weight = np.ones_like(z) if view.perspective else -z
         low = (weight * n).sum(axis=1) / det
         total = np.abs(low).sum(axis=0)
-        loose = 4.0 * slack * (np.abs(weight).max(axis=0) + size * total) / np.abs(det) + SINGLE * total + (0.0 if view.perspective else 2.0 * e)
+        loose = 4.0 * slack * (np.abs(weight).max(axis=0) + size * total) / np.abs(det) + SINGLE * total
+        if not view.perspective:
+            loose += 2.0 * e
         low[2] -= loose
         edges = n * np.sign(det)
         edges[2] -= slack

@@ -47,13 +47,15 @@ def _polytope(primitive):
 
 def _mapped(primitive, corners):
     """Corners in unit space, in the world."""
-    return [(tuple(row[0] * x + row[1] * y + row[2] * z + c for row, c in zip(primitive.matrix, primitive.origin)), 0.0) for x, y, z in corners]
+    return [(tuple(row[0] * x + row[1] * y + row[2] * z + c for row, c in zip(primitive.matrix, primitive.origin)), 0.0)
+            for x, y, z in corners]
 
 
 def _instance(primitive):
     inner = primitive.inner.primitives
     lo, hi = tuple(map(min, *(p.lo for p in inner), inner[0].lo)), tuple(map(max, *(p.hi for p in inner), inner[0].hi))
-    return [(tuple(row[0] * x + row[1] * y + row[2] * z + row[3] for row in primitive.matrix), 0.0) for x, y, z in itertools.product(*zip(lo, hi))]
+    return [(tuple(row[0] * x + row[1] * y + row[2] * z + row[3] for row in primitive.matrix), 0.0)
+            for x, y, z in itertools.product(*zip(lo, hi))]
 
 
 def _box(primitive):

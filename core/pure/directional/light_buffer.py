@@ -230,7 +230,8 @@ class _Sun:
         forward = self.view.rows[2]
         along = sum(a * b for a, b in zip(forward, ray.d))
         across = max(abs(a - along * b) for a, b in zip(ray.d, forward))
-        if not (self.view.usable and along < 0.0 and across <= 2.0**-48 * -along and max(map(abs, ray.o)) <= self.view.extra and ray.t_min >= 0.0):
+        if not (self.view.usable and along < 0.0 and across <= 2.0**-48 * -along
+                and max(map(abs, ray.o)) <= self.view.extra and ray.t_min >= 0.0):
             return None
         u, v, z = self.view.point(ray.o)
         return (u, v, z, along) if abs(u) <= 1.0 and abs(v) <= 1.0 else None

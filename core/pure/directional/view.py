@@ -93,14 +93,16 @@ class View:
             found.append(self.footprint(item, primitive))
             if not item & 255:
                 progress(item / len(primitives))
-        for item, footprint in enumerate(found):
-            for beside in (item + 1, item - 1):
-                if footprint is None or not footprint.edges or not 0 <= beside < len(found) or found[beside] is None or not found[beside].edges:
+        footprints = [footprint for footprint in found if footprint is not None]
+        for footprint in footprints:
+            for item in (footprint.item + 1, footprint.item - 1):
+                beside = found[item] if 0 <= item < len(found) else None
+                if beside is None or not beside.edges or not footprint.edges:
                     continue
-                corners = opposite(primitives[item], primitives[beside])
-                if corners is not None and footprint.join(found[beside], *corners):
+                corners = opposite(primitives[footprint.item], primitives[item])
+                if corners is not None and footprint.join(beside, *corners):
                     break
-        return [footprint for footprint in found if footprint is not None]
+        return footprints
 
     def footprint(self, item, primitive):
         """Where a primitive is seen, or None where the window does not show it."""

@@ -62,7 +62,8 @@ class SortedList(Structure):
         n, drawn = len(self.primitives), self.volumes[0].DRAWN
         shapes = None if drawn == "box" else [self._whole(drawn)] + [v.shape() for v in self.volumes]
         x, y, z = (h - l for l, h in zip(self.lo, self.hi))
-        boxes = [[tuple(map(f, zip(*(getattr(self.primitives[i], end) for i in items)))) for items in self.items] for end, f in (("lo", min), ("hi", max))]
+        boxes = [[tuple(map(f, zip(*(getattr(self.primitives[i], end) for i in items)))) for items in self.items]
+                 for end, f in (("lo", min), ("hi", max))]
         m = len(self.items)
         return Cells.make([self.lo, *boxes[0]], [self.hi, *boxes[1]], [0] + [1] * m,
                           [n] + [len(items) for items in self.items], [False] + [True] * m, [-1] + [0] * m, drawn, shapes,
