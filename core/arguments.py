@@ -44,14 +44,16 @@ def number(low, high):
 def add_parameters(parser, parameters):
     """Add an option for each declared parameter: its name, range, default and help."""
     for p in parameters:
-        option = "--" + p.name.replace("_", "-")
+        option, told = "--" + p.name.replace("_", "-"), p.help[:1].lower() + p.help[1:]
         if p.type is bool:
-            parser.add_argument(option, action="store_true", help=p.help)
-        elif p.choices:
-            parser.add_argument(option, choices=p.choices, default=p.default, help=p.help)
+            parser.add_argument(option, action="store_true", help=told)
+            continue
+        told += f" (default: {p.default})"
+        if p.choices:
+            parser.add_argument(option, choices=p.choices, default=p.default, help=told)
         else:
             kind = whole if p.type is int else number
-            parser.add_argument(option, metavar="N", type=kind(p.low, p.high), default=p.default, help=p.help)
+            parser.add_argument(option, metavar="N", type=kind(p.low, p.high), default=p.default, help=told)
 
 
 #: A type of option: the seed of random numbers.

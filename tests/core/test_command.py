@@ -16,6 +16,7 @@ from rayscope.core import command
 from rayscope.core.command import DONE, FAILED, VERBS, WRONG_CALL, main
 from rayscope.core.fast.hierarchies.bvh import BVH
 from rayscope.core.lab import against_brute, bench
+from rayscope.core.options import PARAMETERS
 
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -71,6 +72,17 @@ def test_trace(run, tmp_path):
     assert {"rayscope", "machine", "scene", "seed"} <= record.keys() and record["scene"]["primitives"] == 200
     assert record["figures"]["primary"]["rays"] == 1200 and record["figures"]["primary"]["N_IT"] > 0
     assert str(image) in out and "N_IT" in out and re.search(r"^primary +bvh +1200", out, re.M)
+
+
+def test_options_of_trace_are_those_that_are_declared(run, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "1000")                               # no word is divided
+    monkeypatch.setenv("NO_COLOR", "1")
+    code, out, err = run("trace", "--help")
+    text = " ".join(out.split())
+    for p in PARAMETERS:
+        option = "--" + p.name.replace("_", "-")
+        told = p.help[:1].lower() + p.help[1:]
+        assert code == DONE and option in text and (told if p.type is bool else f"{told} (default: {p.default})") in text
 
 
 def test_trace_json_alone_on_stdout(run):
