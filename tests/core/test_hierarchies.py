@@ -277,3 +277,15 @@ def test_children_in_order_however_many(sizes):
         own = np.flatnonzero(group == g)
         assert own[np.argsort(rank[own])].tolist() == sorted(own.tolist(), key=lambda k: (value[k], k), reverse=True)
         assert sorted(rank[own].tolist()) == list(range(len(own)))
+
+
+@pytest.mark.parametrize("core", ["pure", "fast"])
+@pytest.mark.parametrize("builder", ["sah", "sweep", "median", "lbvh", "ploc", "incremental"])
+def test_scenes_smaller_than_any_reciprocal(core, builder):
+    """Found at random: coordinates of 1e-308, by whose extent nothing can be divided."""
+    corners = np.random.default_rng(6).random((40, 3, 3)) * 1e-308
+    scene = Scene.from_triangles(corners.reshape(-1, 3), np.arange(120).reshape(-1, 3))
+    centre = corners.mean(axis=1)
+    o, d = centre[:20], centre[20:] - centre[:20]
+    hits, right = (build(scene, name, core, **more).closest(o, d) for name, more in (("bvh", {"builder": builder}), ("brute", {})))
+    assert np.array_equal(hits.t, right.t) and np.isfinite(hits.t).any()

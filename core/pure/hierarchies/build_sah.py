@@ -19,9 +19,9 @@ def _divide(primitives, items, leaf_size):
     for axis in range(3):
         centres = [topdown.centre(primitives[i], axis) for i in items]
         least, extent = min(centres), max(centres) - min(centres)
-        if not 0.0 < extent < math.inf:
+        scale = BINS * (1.0 - 1e-6) / extent if extent else math.inf
+        if not 0.0 < scale < math.inf:
             continue
-        scale = BINS * (1.0 - 1e-6) / extent
         bins = [[] for _ in range(BINS)]
         for i, c in zip(items, centres):
             bins[min(int((c - least) * scale), BINS - 1)].append(i)
