@@ -37,7 +37,7 @@ class Rays:
     def __init__(self, o, d, t_min, t_max, power, leaving=None, apex=None):
         self.n = o.shape[1]
         self.o, self.d, self.t_min, self.t_max, self.power, self.leaving, self.apex = o, d, t_min, t_max, power, leaving, apex
-        self.prepared = None
+        self.prepared, self._looked = None, 0
 
     @classmethod
     def checked(cls, origins, directions, t_min, t_max):
@@ -110,24 +110,54 @@ class Rays:
         """Which of six ways each ray runs, shape (n,), int8: the main axis, plus 3 where it runs against it."""
         side = np.empty(self.n, np.int8)
         for some in blocks(self.n):
-            d = self.d[:, some]
-            x, y, z = np.abs(d)
-            last = z > np.maximum(x, y)
-            middle = (y > x) & ~last
-            x, y, z = d < 0.0
-            # All of these are bytes, 0 or 1.
-            side[some] = 2 * last.view(np.int8) + middle + 3 * (last & z | middle & y | ~(last | middle) & x).view(np.int8)
+            side[some] = _sides(self.d[:, some])
         return side
+
+    def side_of(self, ray):
+        """:attr:`side` of some rays; found out for all once that costs no more than what has been found out singly."""
+        self._looked += len(ray)
+        if "side" not in self.__dict__ and 4 * self._looked < self.n < 2 * np.count_nonzero(self.usual[1]):
+            return _sides(taken(self.d, ray))
+        return self.side.take(ray)
+
+    @cached_property
+    def usual(self):
+        """The side of most rays, as far as a sample tells, and a mask of those that surely have it: sooner than all sides."""
+        sample = _sides(self.d[:, self.n // 37::max(1, self.n // 19)])
+        side = int(np.bincount(sample).argmax()) if self.n else 0
+        i, j, k = AXES[:, side]
+        same = np.empty(self.n, bool)
+        for some in blocks(self.n):
+            d = self.d[:, some]
+            np.less(np.maximum(np.abs(d[i]), np.abs(d[j])), d[k] if side < 3 else -d[k], out=same[some])
+        return side, same
 
     @cached_property
     def main(self):
-        """The axes kx, ky, kz of :attr:`shear` where they are the same for all rays, else None."""
-        return self.main_of(slice(None))
+        """The axes kx, ky, kz of :attr:`shear` where they are the same for all rays, as a rule, else None."""
+        side, same = self.usual
+        return tuple(AXES[:, side].tolist()) if same.all() else None
 
     def main_of(self, ray):
         """The axes of :attr:`shear` where they are the same for some rays, else None."""
-        side = self.side[ray] if isinstance(ray, slice) else self.side.take(ray)
+        if "side" not in self.__dict__:
+            side, same = self.usual
+            if same.take(ray).all():
+                return tuple(AXES[:, side].tolist())
+        side = self.side_of(ray)
         return tuple(AXES[:, side[0]].tolist()) if len(side) and side.min() == side.max() else None
+
+    def alike(self, ray):
+        """Yield positions among some rays of those that run the same way: they are tested together at less cost."""
+        same = self.usual[1].take(ray)
+        if same.all():
+            yield np.arange(len(ray))
+            return
+        yield np.flatnonzero(same)
+        others = np.flatnonzero(~same)
+        side = self.side_of(ray.take(others))
+        for k in np.flatnonzero(np.bincount(side)):
+            yield others[side == k]
 
     @cached_property
     def shear(self):
@@ -166,6 +196,16 @@ def part(value, which):
 def left(structure, leaving, which):
     """What a structure is told of where some rays start, if it wants to know."""
     return np.asarray(leaving)[:, which] if structure.follows and leaving is not None else None
+
+
+def _sides(d):
+    """:attr:`Rays.side` of directions."""
+    x, y, z = np.abs(d)
+    last = z > np.maximum(x, y)
+    middle = (y > x) & ~last
+    x, y, z = d < 0.0
+    # All of these are bytes, 0 or 1.
+    return 2 * last.view(np.int8) + middle + 3 * (last & z | middle & y | ~(last | middle) & x).view(np.int8)
 
 
 def _apex(origins):

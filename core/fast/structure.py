@@ -160,20 +160,33 @@ class Structure:
                     u=np.zeros(n), v=np.zeros(n), part=np.zeros(n, np.int32), normal=np.zeros((3, n)).T,
                     point=np.zeros((3, n)).T, error=np.zeros(n), **counts)
         for number, query in parts:
-            everything = np.flatnonzero(query.item >= 0)
-            for first in range(0, len(everything), SURFACES):
-                found = everything[first:first + SURFACES]
-                at = number.take(found)
-                t, u, v = query.t.take(found), query.u.take(found), query.v.take(found)
-                surface = self.primitives.surface(query.rays, found, query.item.take(found), t, u, v, query.detail.take(found))
-                hits.t[at] = query.rays.callers_t(t, found)
-                hits.u[at], hits.v[at] = u, v
-                hits.object[at], hits.primitive[at], part, normal, point, hits.error[at] = surface
-                if part.any():
-                    hits.part[at] = part
-                for axis in range(3):                       # column by column, several times faster than rows at once
-                    hits.normal[:, axis][at], hits.point[:, axis][at] = normal[:, axis], point[:, axis]
+            for first in range(0, query.rays.n, SURFACES):
+                self._describe(query, slice(first, first + SURFACES), number[first:first + SURFACES], hits)
         return hits
+
+    def _describe(self, query, some, number, hits):
+        """Describe what some rays of a batch (a slice) met; `number` are the callers' numbers of these."""
+        found = np.flatnonzero(query.item[some] >= 0)
+        if not len(found):
+            return
+        columns = query.t, query.u, query.v, query.item, query.detail, query.rays.power
+        if len(found) == len(number) and number[-1] - number[0] == len(number) - 1 and (number[1:] > number[:-1]).all():
+            # All of them, in a row: nothing needs to be picked out.
+            at = slice(number[0], number[-1] + 1)
+            columns = [column[some] for column in columns]
+            found += some.start
+        else:
+            at = number.take(found)
+            found += some.start
+            columns = [column.take(found) for column in columns]
+        t, u, v, item, detail, power = columns
+        surface = self.primitives.surface(query.rays, found, item, t, u, v, detail)
+        hits.t[at], hits.u[at], hits.v[at] = t / power, u, v
+        hits.object[at], hits.primitive[at], part, normal, point, hits.error[at] = surface
+        if part.any():
+            hits.part[at] = part
+        for axis in range(3):                               # column by column, several times faster than rows at once
+            hits.normal[:, axis][at], hits.point[:, axis][at] = normal[:, axis], point[:, axis]
 
     def occluded(self, origins, directions, t_min=0.0, t_max=math.inf, count=False, progress=None, leaving=None, through=None):
         """Whether anything lies at t_min <= t <= t_max.

@@ -140,7 +140,7 @@ def test_without_a_camera_a_notice_says_so(core):
 
 
 def test_ragged_pieces_of_a_picture_are_a_grid():
-    from rayscope.core.fast.directional.image_directory import pixel_grid
+    from rayscope.core.fast.directional.pixels import pixel_grid
     u, v = np.tile(np.linspace(-1, 1, 20), 8), np.repeat(np.linspace(-1, 1, 8), 20)
     for a, b in ((0, 160), (7, 160), (0, 133), (17, 160), (13, 101)):
         grid, offset = pixel_grid(u[a:b], v[a:b])
@@ -153,9 +153,9 @@ def test_ragged_pieces_of_a_picture_are_a_grid():
 @pytest.mark.parametrize("size", [(40, 30)])
 def test_deep_scenes_hide_what_is_behind(size, monkeypatch):
     """Many layers of triangles: few of them are tested."""
-    from rayscope.core.fast.directional import image_directory
-    monkeypatch.setattr(image_directory, "PAIRS", 3000)
-    monkeypatch.setattr(image_directory, "TILE", 4)
+    from rayscope.core.fast.directional import item_buffer
+    monkeypatch.setattr(item_buffer, "PAIRS", 3000)
+    monkeypatch.setattr(item_buffer, "TILE", 4)
     x, y = np.meshgrid(np.arange(12.0), np.arange(12.0), indexing="ij")
     corner = np.stack([x.ravel(), y.ravel()], axis=1)
     layers = []
@@ -170,6 +170,24 @@ def test_deep_scenes_hide_what_is_behind(size, monkeypatch):
     hits = index.closest(o, d, count=True)
     same(hits, brute.closest(o, d))
     assert hits.n_it.mean() < 3.0
+
+
+@pytest.mark.parametrize("begins", [-3.0, -9.0])
+def test_a_floor_that_begins_before_and_ends_behind_what_stands_on_it_is_not_tested_first(begins):
+    """Its nearest point is nearer than all else, or behind the eye; where small things are in front, they are tested."""
+    rng = np.random.default_rng(0)
+    floor = np.array([[(-40, begins, 0), (40, begins, 0), (0, 80, 0)]], float)
+    small = rng.uniform((-1.5, 0, 0.2), (1.5, 1, 1.5), (400, 1, 3)) + 0.1 * rng.normal(size=(400, 3, 3))
+    corners = np.concatenate([floor, small]).reshape(-1, 3)
+    scene = Scene.from_triangles(corners, np.arange(len(corners)).reshape(-1, 3))
+    scene.camera = Camera.look_at((0.0, -4.0, 2.0), (0.0, 0.5, 0.5))
+    index = build(scene, "image-directory")
+    o, d = pixels(scene.camera, (60, 45))
+    hits = index.closest(o, d, count=True)
+    same(hits, build(scene, "bvh").closest(o, d))
+    on_small = hits.primitive > 0
+    assert on_small.sum() > 200 and (hits.primitive == 0).sum() > 200
+    assert hits.n_it[on_small].mean() < 1.3
 
 
 LIGHTS = {

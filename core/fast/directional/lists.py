@@ -11,7 +11,7 @@ import numpy as np
 
 from ..query import Occluded
 from .covers import Covers
-from .image_directory import inside
+from .item_buffer import inside
 from .quadtree import Quadtree, nearness as nearness_in
 from .raster import Grid, spans
 from .view import Footprints

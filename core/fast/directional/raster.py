@@ -61,14 +61,14 @@ def spans(feet, grid, hidden=None):
     Yields
     ------
     foot, cell : ndarray
-        Numbers of footprints and cells (row by row), one entry for each pair; in ascending order of footprints.
+        Numbers of footprints and cells (row by row), one entry for each pair; about in ascending order of footprints.
     """
     one = np.float32
     per_u, per_v = one(1.0 / grid.du), one(1.0 / grid.dv)
     # Half a cell, and what single precision loses, in cells.
     wide = one(grid.half_u / grid.du + 2.0**-10 + grid.columns * 2.0**-20)
     high = one(grid.half_v / grid.dv + 2.0**-10 + grid.rows * 2.0**-20)
-    half_v = one(grid.half_v + grid.dv * (2.0**-10 + grid.rows * 2.0**-20))
+    beyond = one(max(0.0, grid.half_v + grid.dv * (2.0**-10 + grid.rows * 2.0**-20) - feet.room))
     last_i, last_j = one(grid.columns - 1), one(grid.rows - 1)
 
     def column(u, sign):
@@ -93,7 +93,7 @@ def spans(feet, grid, hidden=None):
             keep = np.flatnonzero(~mask)
             some, i0, i1, j0, j1 = (c.take(keep) for c in (some, i0, i1, j0, j1))
         for which, j in _expand(j1 - j0 + 1, j0, CHUNK // 4):
-            foot = some.take(which)
+            foot = _at(some, which)
             v = j.astype(one)
             v *= one(grid.dv)
             v += one(grid.v0)
@@ -102,18 +102,22 @@ def spans(feet, grid, hidden=None):
                 q = q.take(foot)
                 u = q * v
                 u += p.take(foot)
-                np.abs(q, out=q)
-                q *= half_v
+                if beyond:
+                    np.abs(q, out=q)
+                    q *= beyond
+                    u += -q if is_left else q
                 if is_left:
-                    left = np.maximum(left, u - q)
+                    left = np.maximum(left, u)
                 else:
-                    right = np.minimum(right, u + q)
-            # Bounds of the footprint, again: an edge may be left out, or run far beyond its corners.
-            left, right = np.maximum(column(left, -1), i0.take(which)), np.minimum(column(right, 1), i1.take(which))
+                    right = np.minimum(right, u)
+            left, right = column(left, -1), column(right, 1)
+            if beyond:
+                # Bounds of the footprint, again: an edge may be left out, or run far beyond its corners.
+                left, right = np.maximum(left, _at(i0, which)), np.minimum(right, _at(i1, which))
             keep = np.flatnonzero(left <= right)
             foot, left, right = foot.take(keep), left.take(keep).astype(np.int64), right.take(keep).astype(np.int64)
             for which, cell in _expand(right - left + 1, left + j.take(keep) * grid.columns, CHUNK):
-                yield foot.take(which), cell
+                yield _at(foot, which), cell
 
 
 def _nearest(x, start, per, slack, last, sign):
@@ -128,7 +132,19 @@ def _nearest(x, start, per, slack, last, sign):
 
 
 def _expand(count, start, most):
-    """Yield for each k count[k] entries (k, start[k]), (k, start[k] + 1), ..., up to `most` at a time, or those of a single k."""
+    """Yield for each k count[k] entries (k, start[k]), (k, start[k] + 1), ..., up to `most` at a time, or those of one k.
+
+    The first entry of each comes first, as most have no other; numbers k are an array, or a slice.
+    """
+    for a in range(0, len(count), most):
+        yield slice(a, a + most), start[a:a + most]
+    more = np.flatnonzero(count > 1)
+    for which, value in _expand_all(count.take(more) - 1, start.take(more) + 1, most):
+        yield more.take(which), value
+
+
+def _expand_all(count, start, most):
+    """As :func:`_expand`, in order."""
     ends, a = np.cumsum(count), 0
     shift = start - (ends - count)
     while a < len(count):
@@ -139,3 +155,8 @@ def _expand(count, start, most):
         value += shift.take(which)
         yield which, value
         a = b
+
+
+def _at(column, which):
+    """Values of a column, `which` being numbers or a slice."""
+    return column[which] if isinstance(which, slice) else column.take(which)

@@ -10,6 +10,7 @@ than what the views' arithmetic and the tests of primitives lose, and corners ar
 """
 
 from dataclasses import dataclass, fields
+from functools import cached_property
 
 import numpy as np
 
@@ -19,6 +20,8 @@ ROUNDING = 2.0**-42
 SINGLE = 2.0**-20
 #: Edges steeper than this against v do not bound u.
 STEEP = 2.0**20
+#: What nearness may differ by, relative to the greatest and to what all have, in footprints that are not deep.
+DEEP = 0.05
 #: Primitives looked at together.
 CHUNK = 8_192
 
@@ -112,7 +115,11 @@ class Footprints:
         Nearness at (u, v) is at most near_u u + near_v v + near. Nearness is 1 / z in a perspective view, -z in a parallel one.
     nearest
         Greatest nearness.
+    room : float
+        What edges allow v to change by: see :meth:`give_room`.
     """
+
+    room = 0.0
 
     item: np.ndarray
     u_lo: np.ndarray
@@ -143,6 +150,22 @@ class Footprints:
     def joined(cls, parts):
         """Footprints in several windows."""
         return cls(*(np.concatenate([getattr(part, f.name) for part in parts]) for f in fields(cls)))
+
+    def give_room(self, room):
+        """Move edges outwards by what they shift in u when v changes by `room`: grids of points need not allow for it."""
+        self.room = room
+        for p, q in ((self.p0, self.q0), (self.p1, self.q1)):
+            p -= np.float32(room) * np.abs(q)
+        for p, q in ((self.p2, self.q2), (self.p3, self.q3)):
+            p += np.float32(room) * np.abs(q)
+
+    @cached_property
+    def deep(self):
+        """Bool: whether nearness differs by more than a little within a footprint, so that the greatest tells too little."""
+        reach = np.abs(self.near_u) * (self.u_hi - self.u_lo) + np.abs(self.near_v) * (self.v_hi - self.v_lo)
+        finite = np.isfinite(self.nearest)
+        range_ = np.ptp(self.nearest[finite]) if finite.any() else 0.0
+        return ~finite | (reach > DEEP * np.minimum(np.abs(self.nearest), range_))
 
     def take(self, index):
         """Some of the footprints."""
