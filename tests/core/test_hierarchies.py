@@ -289,3 +289,15 @@ def test_scenes_smaller_than_any_reciprocal(core, builder):
     o, d = centre[:20], centre[20:] - centre[:20]
     hits, right = (build(scene, name, core, **more).closest(o, d) for name, more in (("bvh", {"builder": builder}), ("brute", {})))
     assert np.array_equal(hits.t, right.t) and np.isfinite(hits.t).any()
+
+
+@pytest.mark.parametrize("core", ["pure", "fast"])
+@pytest.mark.parametrize("scale", [1e-308, 1e-200, 1e-155])
+@pytest.mark.parametrize("name, more", [("sphere-tree", {}), ("sorted-list", {"volume": "sphere"}), ("obb-tree", {}), ("kdop-tree", {})])
+def test_volumes_smaller_than_any_square(core, scale, name, more):
+    corners = np.random.default_rng(6).random((20, 3, 3)) * scale
+    scene = Scene.from_triangles(corners.reshape(-1, 3), np.arange(60).reshape(-1, 3))
+    centre = corners.mean(axis=1)
+    o, d = centre[:10], centre[10:] - centre[:10]
+    hits, right = (build(scene, technique, core, **own).closest(o, d) for technique, own in ((name, more), ("brute", {})))
+    assert np.array_equal(hits.t, right.t) and np.isfinite(hits.t).any()

@@ -14,6 +14,8 @@ from .hull import balls
 
 #: Steps after which the search is given up (rounding may make it go in circles); the sphere is then a little too large.
 STEPS = 64
+#: Squares are at least this much too large: those of numbers below 1e-154 may be 0.
+LEAST = 1e-300
 #: Balls that stick out by less, relative to the sphere, count as inside until the end.
 INSIDE = 1e-12
 
@@ -45,7 +47,7 @@ class Spheres(Volumes):
         x, y, z = x - middle * ray[3], y - middle * ray[4], z - middle * ray[5]
         radius = volume[3] + 4.0 * slack
         with np.errstate(invalid="ignore"):
-            half = np.sqrt((radius * radius - (x * x + y * y + z * z)) / dd)
+            half = np.sqrt((radius * radius - (x * x + y * y + z * z) + LEAST) / dd)
         loose = 4.0 * EPSILON * (np.abs(middle) + half)
         # NaN, where the root has failed, is no number below another: a miss.
         return np.maximum(middle - half - loose, t_min), np.minimum(middle + half + loose, t_far)

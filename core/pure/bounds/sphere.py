@@ -15,6 +15,8 @@ from .hull import balls
 
 #: Steps after which the search is given up (rounding may make it go in circles); the sphere is then a little too large.
 STEPS = 64
+#: Squares are at least this much too large: those of numbers below 1e-154 may be 0.
+LEAST = 1e-300
 #: Balls that stick out by less, relative to the sphere, count as inside until the end.
 INSIDE = 1e-12
 
@@ -48,7 +50,7 @@ class Sphere(Volume):
         middle = (x * d[0] + y * d[1] + z * d[2]) / dd
         x, y, z = x - middle * d[0], y - middle * d[1], z - middle * d[2]
         radius = self.radius + 4.0 * self.margin.spare(ray)
-        square = (radius * radius - (x * x + y * y + z * z)) / dd
+        square = (radius * radius - (x * x + y * y + z * z) + LEAST) / dd
         if square < 0.0:
             return None
         half = math.sqrt(square)
