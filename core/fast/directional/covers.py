@@ -81,8 +81,10 @@ class Covers:
 
     def beside(self, which, u, v, wide, high):
         """Greatest nearness, in the cells of :meth:`least`, of neighbours that share outlines; -inf where none do."""
-        a, b, c = self.other[:, which]
-        return a * u + b * v + c + np.abs(a) * (wide + 2.0**-30) + np.abs(b) * (high + 2.0**-30) + self.loose[which]
+        (a, b, c), loose = self.other[:, which], self.loose[which]
+        with np.errstate(invalid="ignore"):
+            nearness = a * u + b * v + c + np.abs(a) * (wide + 2.0**-30) + np.abs(b) * (high + 2.0**-30) + loose
+        return np.where(loose > -np.inf, nearness, -np.inf)
 
 
 def _of_faces(view, kind, item):
