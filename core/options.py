@@ -33,12 +33,19 @@ PARAMETERS = (
     ),
     Parameter(
         "aa_threshold",
-        0.025,
+        0.028,
         "Adaptive antialiasing: differences in displayed values, 0 to 1, that are put up with: between corners; "
-        "as the standard error of a pixel with 4 samples, n / 4 of it with n",
+        "as the standard error of a pixel with 4 samples, (n / 4)^0.75 of it with n",
         low=0.0,
         high=1.0,
     ),
     Parameter("light_samples", 1, "Shadow rays to each light that has an extent, per surface met", low=1, high=4096),
-    Parameter("aa_level", 3, "Adaptive antialiasing: 4^level samples a pixel, at most", low=1, high=8),
+    Parameter(
+        "aa_level",
+        3,
+        "Adaptive antialiasing: pixels between corners are divided into four so many times; "
+        "by variance, 4 samples become four times as many so many times, at most",
+        low=1,
+        high=8,
+    ),
 )

@@ -163,9 +163,11 @@ class Rendering:
         and more where their variance is high. Both adaptive ways sample lights that have an extent. Default uniform.
     aa_threshold : float
         Difference in displayed values, 0 to 1, that is put up with: between the corners; as the standard error of a
-        pixel with 4 samples, n / 4 of it with n, so that samples go where they take most from the error. Default 0.025.
+        pixel with 4 samples, (n / 4)**0.75 of it with n, so that samples go where they take most from the error; more
+        in noisy pictures (:class:`~rayscope.core.adaptive.ByVariance`). Default 0.028.
     aa_level : int
-        4**aa_level samples a pixel, at most; corners are divided `aa_level` times. Default 3.
+        Pixels between corners are divided into four so many times; by variance there are at most 4 * 4**aa_level
+        samples a pixel. Default 3.
     light_samples : int
         Shadow rays to each light that has an extent, wherever a surface is shaded. With more than one, its shadows are
         soft also with one sample a pixel. Default 1.
@@ -232,7 +234,7 @@ class Rendering:
             self.result.notices.append(
                 Notice(row.name, "each pixel is traced as a whole, once: samples and antialiasing were left aside.")
             )
-        samples = self.samples if antialiasing == "uniform" else 4 ** options["aa_level"]
+        samples = self.samples if antialiasing == "uniform" else 4 ** (1 + options["aa_level"])
         given = {**options, "samples": samples}
         self._tracer = tracer(scene, self.result.structures, self.size, given, self.count, self._check)
         self.result.notices += self._tracer.notices

@@ -19,9 +19,11 @@ from .picture_error import displayed
 SAMPLES, FINER = 16, 16
 #: The reference is the mean of so many independent pictures.
 PARTS = 2
-DEPTH, LEVEL = 5, 3
-THRESHOLDS = (0.04, 0.03, 0.025)
-#: The examples that the bar is for: at no more error than the uniform samples' no more than this part of their time.
+DEPTH = 5
+#: Beside the default.
+THRESHOLDS = (0.05, 0.02)
+#: The examples that the bar is for: with the default setting no more error than the uniform samples', in no more than
+#: this part of their time.
 ASKED, BAR = ("still_life", "interior"), 0.5
 
 
@@ -45,7 +47,7 @@ def antialiasing(scenes, size, seeds=5, seed=0, say=lambda line: None):
         rows : list of dict, a setting of a scene each: RMSE over all seeds and pixels; ``error ratio``, ``rays``,
         ``time`` as parts of those of the uniform samples, with the least and the most of single seeds.
         floors : dict, scene -> the reference's own error.
-        missed : list of the scenes asked about where no threshold was as exact in half the time.
+        missed : list of the scenes asked about where the default setting was not as exact in half the time.
     """
     rows, floors, missed = [], {}, []
     for scene in scenes:
@@ -54,7 +56,7 @@ def antialiasing(scenes, size, seeds=5, seed=0, say=lambda line: None):
         exact, floors[scene.name] = reference(scene, index, size, seed + seeds)
         own = compared(scene, index, size, range(seed, seed + seeds), exact, say)
         rows += own
-        if scene.name in ASKED and not any(row["error ratio"] <= 1.0 and row["time"] <= BAR for row in own[1:]):
+        if scene.name in ASKED and not (own[1]["error ratio"] <= 1.0 and own[1]["time"] <= BAR):
             missed.append(scene.name)
     return {"rows": rows, "floors": floors, "missed": missed}
 
@@ -73,10 +75,10 @@ def reference(scene, index, size, seed):
 
 
 def compared(scene, index, size, seeds, exact, say=lambda line: None):
-    """The rows of one scene: the uniform samples first."""
-    ways = {f"{SAMPLES} uniform samples": {"samples": SAMPLES}}
+    """The rows of one scene: the uniform samples first, then the default setting."""
+    ways = {f"{SAMPLES} uniform samples": {"samples": SAMPLES}, "variance": {"antialiasing": "variance"}}
     for threshold in THRESHOLDS:
-        ways[f"variance, {threshold:g}"] = {"antialiasing": "variance", "aa_threshold": threshold, "aa_level": LEVEL}
+        ways[f"variance, {threshold:g}"] = {"antialiasing": "variance", "aa_threshold": threshold}
     trace(scene, index=index, size=(16, 12), depth=DEPTH, samples=2)  # what is imported or made at first use
     squares, rays, seconds = (np.empty((len(ways), len(seeds))) for _ in range(3))
     for k, seed in enumerate(seeds):
@@ -113,5 +115,5 @@ def text(result):
     for name in ASKED:
         if name in result["floors"]:
             verdict = "not met" if name in result["missed"] else "met"
-            lines.append(f"{name}: no more error in at most {BAR:g} of the time: {verdict}.")
+            lines.append(f"{name}: the default setting, no more error in at most {BAR:g} of the time: {verdict}.")
     return "\n".join(lines)

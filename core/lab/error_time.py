@@ -309,10 +309,10 @@ class _Sweep:
                 continue
             curve(
                 "antialiasing",
-                f"{way}, 4^{levels} samples at most",
+                f"{way}, {4**levels} samples at most",
                 [(f"aa_threshold {t:g}", {"aa_threshold": t}) for t in (0.3, 0.1, 0.03, 0.01)],
                 antialiasing=way,
-                aa_level=levels,
+                aa_level=levels - least + 1,
             )
         some = max(finest // 4, 2)
         if any(m.reflects for m in materials):
@@ -410,7 +410,7 @@ class _Sweep:
         """Cost of a setting, roughly, in samples a pixel."""
         o = setting.options
         if o.get("antialiasing", "uniform") != "uniform":
-            return 1.0 + 0.5 * 4 ** o["aa_level"]
+            return 1.0 + 0.5 * finest
         return o["samples"] * (1.0 + 0.5 * (o.get("light_samples", 1) - 1))
 
     def _measure(self, settings, work, reference, cost):

@@ -116,7 +116,7 @@ class Estimate:
         return self
 
 
-def estimate(scene, technique="bvh", core="fast", size=None, samples=1, depth=5, antialiasing="uniform", aa_threshold=0.025, aa_level=3,
+def estimate(scene, technique="bvh", core="fast", size=None, samples=1, depth=5, antialiasing="uniform", aa_threshold=0.028, aa_level=3,
              light_samples=1, threshold=0.0, **others):
     """Estimate a build, and with a `size` the picture too.
 
@@ -167,8 +167,8 @@ def _samples(samples, antialiasing, threshold, level):
         return samples
     finer, most = 0.03 / max(threshold, 1e-6), 4**level
     if antialiasing == "variance":
-        # Errors of n samples below n times the threshold need so many.
-        return min(max(samples, 4, ASKED * finer ** (2.0 / 3.0)), most)
+        # Errors of n samples below n^0.75 times the threshold need so many.
+        return min(max(samples, 4, ASKED * finer**0.8), 4 * most)
     # Pixels are divided down to the end where there is an edge; a threshold ten times as fine finds three times as many.
     return 1 + min(1.0, UNEVEN * math.sqrt(finer)) * (most - 1)
 

@@ -122,7 +122,7 @@ def test_object_and_depth_divide_pixels_whose_corners_look_alike(core):
 
 @CORES
 def test_variance_without_a_threshold_is_uniform_sampling(core):
-    adaptive = trace(lit(), "brute", core, (6, 5), 2, seed=2, antialiasing="variance", aa_threshold=0.0, aa_level=2)
+    adaptive = trace(lit(), "brute", core, (6, 5), 2, seed=2, antialiasing="variance", aa_threshold=0.0, aa_level=1)
     uniform = trace(lit(), "brute", core, (6, 5), 2, seed=2, samples=16)
     rays = adaptive.passes["rays_per_pixel"]
     full = rays == uniform.passes["rays_per_pixel"]
@@ -172,12 +172,12 @@ def test_fewer_rays_than_16_uniform_samples_for_the_same_error():
     scene, size = lit(), (48, 36)
 
     def measured(**how):
-        results = [trace(scene, size=size, seed=seed, **how) for seed in (3, 4)]
+        results = [trace(scene, size=size, seed=seed, **how) for seed in range(3, 7)]
         rays = sum(f["rays"] for r in results for f in r.figures.values() if isinstance(f, dict))
         return math.sqrt(np.mean([(r.image - reference(size)) ** 2 for r in results])), rays
 
     uniform = measured(samples=16)
-    for way, threshold, most in (("variance", 0.005, 1.0), ("corners", 0.03, 1.15)):
+    for way, threshold, most in (("variance", 0.024, 1.0), ("corners", 0.03, 1.15)):
         error, rays = measured(antialiasing=way, aa_threshold=threshold, aa_level=3)
         assert error <= most * uniform[0], way
         assert rays <= uniform[1] / 2, way
@@ -256,4 +256,4 @@ def test_the_command_takes_them(tmp_path, capsys):
     assert main([*call, "--roulette"]) == 0
     assert "saved" in capsys.readouterr().out
     assert main([*call, "--aa-level", "0"]) == 2
-    assert "aa_level" in capsys.readouterr().err
+    assert "aa-level" in capsys.readouterr().err

@@ -25,8 +25,8 @@ def test_measures_error_rays_and_time(monkeypatch):
     monkeypatch.setattr(antialiasing, "THRESHOLDS", (1.0, 1e-6))
     said = []
     result = antialiasing.antialiasing([room("interior"), room("another")], SIZE, 2, say=said.append)
-    assert said and [row["scene"] for row in result["rows"]] == ["interior"] * 3 + ["another"] * 3
-    uniform, coarse, fine = result["rows"][:3]
+    assert said and [row["scene"] for row in result["rows"]] == ["interior"] * 4 + ["another"] * 4
+    uniform, usual, coarse, fine = result["rows"][:4]
     assert uniform["error ratio"] == uniform["rays"] == uniform["time"] == 1.0
     # Four samples everywhere; up to 64 wherever anything differs.
     assert coarse["rays"] == pytest.approx(0.25, abs=0.01) and coarse["error ratio"] > 1.0
@@ -34,10 +34,15 @@ def test_measures_error_rays_and_time(monkeypatch):
     for row in result["rows"]:
         assert row["error, least"] <= row["error ratio"] <= row["error, most"]
         assert 0 < row["time, least"] <= row["time"] <= row["time, most"]
-    # The coarse one is not as exact, the fine one not as quick; nothing is asked of other scenes.
+    assert coarse["rays"] < usual["rays"] < fine["rays"]
+    # Nothing is asked of other scenes.
+    monkeypatch.setattr(antialiasing, "BAR", 0.0)
+    result = antialiasing.antialiasing([room("interior"), room("another")], SIZE, 1)
     assert result["missed"] == ["interior"]
     text = antialiasing.text(result)
-    assert "interior: no more error in at most 0.5 of the time: not met." in text and "another: no more" not in text
+    assert "interior: the default setting, no more error in at most 0 of the time: not met." in text
+    assert "another: the" not in text
+    monkeypatch.setattr(antialiasing, "SAMPLES", 1)
     monkeypatch.setattr(antialiasing, "BAR", math.inf)
     assert antialiasing.antialiasing([room("interior")], SIZE, 1)["missed"] == []
 
@@ -62,7 +67,7 @@ def test_the_command(monkeypatch, capsys):
     assert main([*call, "--json"]) == 0
     printed = json.loads(capsys.readouterr().out)
     assert printed["parameters"] == {"adaptive": True, "size": [8, 6], "repeats": 1, "only": ["interior"]}
-    assert len(printed["rows"]) == 2
+    assert len(printed["rows"]) == 3
     monkeypatch.setattr(antialiasing, "BAR", 0.0)
     assert main(call) == 1
     assert "not met" in capsys.readouterr().out

@@ -1,8 +1,10 @@
 """Adaptive antialiasing in this core; see :mod:`~rayscope.core.adaptive`."""
 
+import math
+
 import numpy as np
 
-from ...adaptive import ACROSS, DEPTHS, FAR, FIRST, OWN, SPENT, Adaptive, ByVariance
+from ...adaptive import AROUND, DEPTHS, FAR, FEW, FIRST, RISE, SPENT, Adaptive, ByVariance
 from . import sampling
 from .whitted import WAVE
 
@@ -134,6 +136,8 @@ class Variance(ByVariance):
         for turn in range(1 + self.rounds):
             if turn:
                 more = np.minimum(n * self._worth(n, total, squares, rays), self.most - n)
+                if more.sum() * FEW < more.size:
+                    break
             # Each turn has about half as many rays as the one before.
             left *= 0.5
             for i, tile in enumerate(order):
@@ -170,18 +174,17 @@ class Variance(ByVariance):
 
     def _worth(self, n, total, squares, rays):
         """How many times the samples that they have the pixels shall get."""
-        mean = total / n[..., None]
-        variance = np.maximum(squares / n[..., None] - mean * mean, 0.0) * (n / (n - 1))[..., None]
-        seen = np.minimum(mean, 1.0)
-        differ = np.maximum(_mean_of_9(seen * seen) - _mean_of_9(seen) ** 2, 0.0)
-        variance = OWN * variance + (1.0 - OWN) * _mean_of_9(variance) + ACROSS * differ
-        error = np.sqrt(variance / n[..., None])
+        many = n[..., None]
+        mean = total / many
+        variance = np.maximum(squares / many - mean * mean, 0.0) * (many / (many - 1))
+        error = np.sqrt((many * variance + AROUND * _mean_of_9(variance)) / ((many + AROUND) * many))
         # Either way: a pixel that is all white so far can only become darker.
-        off = np.maximum(shown(mean + error) - shown(mean), shown(mean) - shown(mean - error))
+        off = np.maximum(shown(mean + error) - shown(mean), shown(mean) - shown(mean - error)).max(axis=-1)
+        if self.noise is None:
+            self.noise = math.sqrt(np.mean(off * off))
         cost = rays / n
-        much = off.max(axis=-1)
-        allowed = self.threshold * n / FIRST * np.sqrt(cost / cost.mean())
-        return np.where(much > FAR * allowed, 3, np.where(much > allowed, 1, 0))
+        allowed = self.allowed() * (n / FIRST) ** RISE * np.sqrt(cost / cost.mean())
+        return np.where(off > FAR * allowed, 3, np.where(off > allowed, 1, 0))
 
 
 def _mean_of_9(a):

@@ -2,7 +2,7 @@
 
 import math
 
-from ...adaptive import ACROSS, DEPTHS, FAR, FIRST, OWN, SPENT, Adaptive, ByVariance
+from ...adaptive import AROUND, DEPTHS, FAR, FEW, FIRST, RISE, SPENT, Adaptive, ByVariance
 from ...vectors import add, mul, times
 from . import sampling
 from .camera import through
@@ -121,10 +121,11 @@ class Variance(Counted, ByVariance):
         more, left = dict.fromkeys(everywhere, self.begin), 1.0
         for turn in range(1 + self.rounds):
             if turn:
-                variances = {pixel: self._variance(pixel) for pixel in everywhere}
-                cost = sum(self.rays[pixel] / self.state[pixel][0] for pixel in everywhere) / len(everywhere)
-                for pixel, (n, *_) in self.state.items():
-                    more[pixel] = min(n * self._worth(pixel, variances, cost), self.most - n)
+                for pixel, times_more in self._worth(everywhere).items():
+                    n = self.state[pixel][0]
+                    more[pixel] = min(n * times_more, self.most - n)
+                if sum(more.values()) * FEW < len(more):
+                    break
             # Each turn has about half as many rays as the one before.
             left *= 0.5
             for i, tile in enumerate(order):
@@ -156,23 +157,32 @@ class Variance(Counted, ByVariance):
         n, total, squares = self.state[pixel]
         return tuple(max(s / n - (t / n) ** 2, 0.0) * (n / (n - 1)) for s, t in zip(squares, total))
 
-    def _worth(self, pixel, variances, cost):
-        """How many times the samples that it has a pixel shall get."""
+    def _worth(self, pixels):
+        """How many times the samples that they have the pixels shall get."""
+        variances = {pixel: self._variance(pixel) for pixel in pixels}
+        off = {pixel: self._off(pixel, variances) for pixel in pixels}
+        if self.noise is None:
+            self.noise = math.sqrt(sum(v * v for v in off.values()) / len(off))
+        costs = {pixel: self.rays[pixel] / self.state[pixel][0] for pixel in pixels}
+        usual, worth = sum(costs.values()) / len(costs), {}
+        for pixel in pixels:
+            n = self.state[pixel][0]
+            allowed = self.allowed() * (n / FIRST) ** RISE * math.sqrt(costs[pixel] / usual)
+            worth[pixel] = 3 if off[pixel] > FAR * allowed else 1 if off[pixel] > allowed else 0
+        return worth
+
+    def _off(self, pixel, variances):
+        """Standard error of a pixel, as displayed."""
         x, y = pixel
-        near = [p for dy in (-1, 0, 1) for dx in (-1, 0, 1) if (p := (x + dx, y + dy)) in variances]
+        near = [variances[p] for dy in (-1, 0, 1) for dx in (-1, 0, 1) if (p := (x + dx, y + dy)) in variances]
         n, total, _ = self.state[pixel]
-        much = 0.0
+        off = 0.0
         for channel in range(3):
-            mean = total[channel] / n
-            seen = [min(self.state[p][1][channel] / self.state[p][0], 1.0) for p in near]
-            differ = max(sum(s * s for s in seen) / len(near) - (sum(seen) / len(near)) ** 2, 0.0)
-            around = sum(variances[p][channel] for p in near) / len(near)
-            variance = OWN * variances[pixel][channel] + (1.0 - OWN) * around + ACROSS * differ
-            error = math.sqrt(variance / n)
+            mean, around = total[channel] / n, sum(v[channel] for v in near) / len(near)
+            error = math.sqrt((n * variances[pixel][channel] + AROUND * around) / ((n + AROUND) * n))
             # Either way: a pixel that is all white so far can only become darker.
-            much = max(much, shown(mean + error) - shown(mean), shown(mean) - shown(mean - error))
-        allowed = self.threshold * n / FIRST * math.sqrt(self.rays[pixel] / n / cost)
-        return 3 if much > FAR * allowed else 1 if much > allowed else 0
+            off = max(off, shown(mean + error) - shown(mean), shown(mean) - shown(mean - error))
+        return off
 
 
 WAYS = {"corners": Corners, "variance": Variance}
