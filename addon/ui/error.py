@@ -1,8 +1,8 @@
 """Error against run time: an operator that sweeps the tracer's settings, and a panel with what came out."""
 
 import tempfile
-import textwrap
 
+import blf
 import bpy
 from bpy.props import IntProperty
 
@@ -11,6 +11,8 @@ from .operators import Work
 
 #: Names of the image datablocks begin so.
 IMAGES = "Rayscope "
+#: Pixels of an icon; a panel's edges, its icon and the sidebar's tabs take four.
+UNIT = 20
 
 #: Scene's session_uid -> what was found, in words.
 _words = {}
@@ -93,6 +95,15 @@ class RAYSCOPE_OT_error(Work, bpy.types.Operator):
             self._task = self.prepare(context)
         return super()._start(context)
 
+    def modal(self, context, event):
+        """Once it was stopped, what was measured till then is there when the thread has ended."""
+        if event.type == "ESC" and event.value == "PRESS":
+            self._job.cancel()
+        if self._job.cancelled and self._job.running:
+            context.workspace.status_text_set(f"{self.title}: stopped, what was measured is kept")
+            return {"RUNNING_MODAL"} if event.type == "ESC" else {"PASS_THROUGH"}
+        return super().modal(context, event)
+
     def show(self, task):
         pass
 
@@ -124,6 +135,21 @@ def put(path):
     return image
 
 
+def wrapped(text, context):
+    """Lines of a text that are no wider than a panel of this region has room for beside an icon."""
+    scale = context.preferences.system.ui_scale
+    room = context.region.width - 4 * UNIT * scale
+    blf.size(0, context.preferences.ui_styles[0].widget.points * scale)
+    lines = [""]
+    for word in text.split():
+        longer = f"{lines[-1]} {word}".lstrip()
+        if lines[-1] and blf.dimensions(0, longer)[0] > room:
+            lines.append(word)
+        else:
+            lines[-1] = longer
+    return lines
+
+
 class RAYSCOPE_PT_error(panels.Sidebar, bpy.types.Panel):
     bl_label = "Error Against Run Time"
     bl_options = {"DEFAULT_CLOSED"}
@@ -134,7 +160,7 @@ class RAYSCOPE_PT_error(panels.Sidebar, bpy.types.Panel):
         words = _words.get(context.scene.session_uid, ())
         column = layout.column(align=True)
         for text in words:
-            for i, line in enumerate(textwrap.wrap(text, max(24, context.region.width // 8))):
+            for i, line in enumerate(wrapped(text, context)):
                 column.label(text=line, icon="DOT" if i == 0 else "BLANK1")
         images = [image.name for image in bpy.data.images if image.name.startswith(IMAGES)]
         if words and images:
