@@ -306,9 +306,14 @@ class Rendering:
             for kind, choice in wanted.items()
         }
         todo = list(dict.fromkeys(k for k in keys.values() if k is not None and k not in built))
+        # What serves some kinds of ray hands others on to the standard technique: where that is wanted too, to the same.
+        plain = STANDARD, tuple(sorted(resolve(STANDARD, technique_row(STANDARD).parameters, {}, self.core).items()))
+        todo.sort(key=lambda key: key != plain)
         for i, key in enumerate(todo):
             report = partial(self._building, done=i, of=len(todo))
-            built[key] = build(self.scene, key[0], self.core, progress=report, beside=standard, **dict(key[1]))
+            built[key] = build(
+                self.scene, key[0], self.core, progress=report, beside=built.get(plain), **dict(key[1])
+            )
         self.result.structures = {kind: index if key is None else built[key] for kind, key in keys.items()}
         self._known = {name: own for (name, _), own in built.items()}
         for kind, (some, expected) in self._contenders.items():

@@ -110,6 +110,20 @@ def test_camera_rays_are_served_and_others_handed_over(core):
     assert index._second is not None
 
 
+@pytest.mark.parametrize("core", CORES)
+def test_a_picture_builds_the_hierarchy_once(core):
+    """What the directory hands over goes to the structure that serves the other kinds of ray."""
+    from rayscope.core import trace
+    scene = jittered_sphere(np.random.default_rng(0))
+    scene.camera = Camera.look_at((0.3, -4.0, 1.0), (0.0, 0.0, 0.0))
+    scene.lights = [Light("lamp", "point", (200.0,) * 3, position=(2.0, -2.0, 4.0))]
+    for primary in ("image-directory", ("image-directory", {})):
+        found = trace(scene, core=core, size=(4, 3), primary=primary).structures
+        assert found["shadow"].technique.name == "bvh" and found["primary"].second is found["shadow"]
+    found = trace(scene, core=core, size=(4, 3), primary="image-directory", shadow=("bvh", {"leaf_size": 7})).structures
+    assert found["primary"].second is not found["shadow"]
+
+
 @pytest.mark.parametrize("apart", [False, True])
 def test_a_cell_covered_by_one_face_answers_at_once(apart):
     """Two large triangles in front of many small ones: together they hide these; if they are not neighbours, each for itself."""
