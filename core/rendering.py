@@ -409,7 +409,9 @@ class Rendering:
             )
             if name == "combined":
                 # The mean so far; a picture stopped now is complete.
-                target[..., :3] += (value - target[..., :3]) * (n / (before + n))
+                with np.errstate(invalid="ignore", over="ignore"):  # what glows without end
+                    more = (value - target[..., :3]) * (n / (before + n))
+                    target[..., :3] = target[..., :3] + more if before else value
                 target[..., 3] = 1.0
             elif name in ("rays_per_pixel", *COUNTED_PASSES):
                 target += value.astype(target.dtype)

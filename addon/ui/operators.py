@@ -163,12 +163,14 @@ class RAYSCOPE_OT_trace(Work, bpy.types.Operator):
     @staticmethod
     def _put(task):
         from ..show import image
-        return image.show(image.put(task.result.image))
+        picture = image.put(task.result.image)
+        return picture, image.show(picture)
 
     def finish(self, task, job):
         if task.result is None:
             return "Tracing was stopped while the structure was built: the image is unchanged"
-        where = "" if self._put(task) else ': see the image "Rayscope" in an Image Editor'
+        picture, shown = self._put(task)
+        where = "" if shown else f': see the image "{picture.name}" in an Image Editor'
         task.keep()
         if job.cancelled:
             return f"Tracing was stopped at {job.fraction:.0%}, what was done is kept{where}"

@@ -87,8 +87,8 @@ def _property(parameter, core):
     if parameter.type is bool:
         return BoolProperty(**about)
     make = IntProperty if parameter.type is int else FloatProperty
-    if parameter.unit == "bytes":
-        about["precision"] = 0
+    if make is FloatProperty:
+        about["precision"] = 0 if parameter.unit == "bytes" else 3
     limits = {
         key: parameter.type(value)
         for key, value in (("min", parameter.low), ("max", parameter.high))

@@ -269,7 +269,7 @@ def _where(error, path, core=None):
     if isinstance(error, SyntaxError) and error.filename == str(path):
         return f"line {error.lineno}: {error.msg}"
     frames = traceback.extract_tb(error.__traceback__)
-    if core and isinstance(error, NotImplementedError) and frames[-1].name in METHODS[core]:
+    if core and isinstance(error, NotImplementedError) and frames[-1].filename != str(path) and frames[-1].name in METHODS[core]:
         return f"it has no method {METHODS[core][frames[-1].name]}"
     lines = [f for f in frames if f.filename == str(path)]
     told = f"{type(error).__name__}: {error}"

@@ -48,6 +48,11 @@ class Peer(Structure):
         index.notices += index._far(row)
         return index
 
+    @classmethod
+    def beside(cls, other, row, parameters, progress=None):
+        """Nothing is taken from another structure: triangles go in alone, in world space."""
+        return cls.over(other.scene, row, parameters, progress)
+
     def _far(self, row):
         """What float32 costs in a scene that is small and far from the origin."""
         lo, hi = self.primitives.lo, self.primitives.hi

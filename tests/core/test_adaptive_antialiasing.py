@@ -121,6 +121,19 @@ def test_object_and_depth_divide_pixels_whose_corners_look_alike(core):
 
 
 @CORES
+@pytest.mark.parametrize("bright", [1e200, math.inf])
+def test_what_glows_without_end_hides_no_other_edge(core, bright):
+    scene = lit()
+    glow = Material("glow", diffuse=0, ambient=0, emission=(bright,) * 3)
+    star = np.array([(-1.2, 0, 1.2), (-0.9, 0, 1.2), (-1.05, 0, 1.5)])
+    plain = trace(scene, "brute", core, (16, 12), antialiasing="variance")
+    scene.objects.append(Object("star", Mesh(star, [(0, 1, 2)]), materials=(glow,)))
+    found = trace(scene, "brute", core, (16, 12), antialiasing="variance")
+    assert np.isinf(found.image).any() or found.image.max() > 1e30
+    assert found.figures["primary"]["rays"] > 0.7 * plain.figures["primary"]["rays"] > 0.7 * 4.5 * 16 * 12
+
+
+@CORES
 def test_variance_without_a_threshold_is_uniform_sampling(core):
     adaptive = trace(lit(), "brute", core, (6, 5), 2, seed=2, antialiasing="variance", aa_threshold=0.0, aa_level=1)
     uniform = trace(lit(), "brute", core, (6, 5), 2, seed=2, samples=16)

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from rayscope.core import Mesh, MissingPackageError, Object, Scene, SceneError, build, solids
+from rayscope.core import Camera, Light, Mesh, MissingPackageError, Object, Scene, SceneError, build, solids, trace
 from rayscope.core.peers import peer
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -149,3 +149,16 @@ def test_far_from_the_origin_it_is_told_what_float32_costs(name):
         assert [n.text for n in index.notices if "wrong by about 1 there" in n.text] == [n.text for n in index.notices]
         assert bool(index.notices) == told
     assert not build(Scene(), name).notices
+
+
+def test_for_one_kind_of_ray_beside_another_technique(name):
+    """What it is given is what it is given alone: no solids, and triangles in world space."""
+    camera, lights = Camera.look_at((0, -6, 1), (0, 0, 0)), [Light("lamp", "point", (90.0,) * 3, (3, -3, 3))]
+    scene = Scene(solids=[solids.sphere((0, 0, 0), 1.0)], camera=camera, lights=lights)
+    with pytest.raises(SceneError, match="takes triangles only"):
+        trace(scene, size=(4, 3), primary=name)
+    scene = soup()
+    scene.camera, scene.lights = camera, lights
+    ours, found = trace(scene, size=(16, 12)), trace(scene, size=(16, 12), primary=name)
+    assert "memory" not in found.structures["primary"].figures
+    assert np.array_equal(ours.image, found.image) and ours.image[..., :3].any()

@@ -90,8 +90,10 @@ def refined(o, d, rows, t, low, high, deep, asked):
         if which.any():
             within = low[which], high[which], asked.take(which)
             found[which] = function(o[:, which], d[:, which], rows[:, which], t[which], *(within if function is crossings else ()))
-    slack = 2.0**-50 * np.maximum(np.abs(low), np.abs(high))
-    return np.where((found >= low - slack) & (found <= high + slack), np.minimum(np.maximum(found, low), high), t)
+    with np.errstate(invalid="ignore"):  # ends that are infinite: t stays
+        slack = 2.0**-50 * np.maximum(np.abs(low), np.abs(high))
+        within = (found >= low - slack) & (found <= high + slack)
+    return np.where(within, np.minimum(np.maximum(found, low), high), t)
 
 
 def nearby(o, d, rows, t):

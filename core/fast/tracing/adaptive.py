@@ -152,7 +152,8 @@ class Variance(ByVariance):
                     spent.append((pixels, costs))
                     np.add.at(rays[part], (py, px), costs["rays_per_pixel"])
                     np.add.at(total[part], (py, px), radiance)
-                    np.add.at(squares[part], (py, px), radiance * radiance)
+                    with np.errstate(over="ignore"):
+                        np.add.at(squares[part], (py, px), radiance * radiance)
                     begun = np.flatnonzero(number == 0)
                     for name, value in out.items():
                         first.setdefault(name, []).append(value[begun])
@@ -175,11 +176,13 @@ class Variance(ByVariance):
     def _worth(self, n, total, squares, rays):
         """How many times the samples that they have the pixels shall get."""
         many = n[..., None]
-        mean = total / many
-        variance = np.maximum(squares / many - mean * mean, 0.0) * (many / (many - 1))
-        error = np.sqrt((many * variance + AROUND * _mean_of_9(variance)) / ((many + AROUND) * many))
-        # Either way: a pixel that is all white so far can only become darker.
-        off = np.maximum(shown(mean + error) - shown(mean), shown(mean) - shown(mean - error)).max(axis=-1)
+        with np.errstate(over="ignore", invalid="ignore"):
+            mean = total / many
+            variance = np.maximum(squares / many - mean * mean, 0.0) * (many / (many - 1))
+            error = np.sqrt((many * variance + AROUND * _mean_of_9(variance)) / ((many + AROUND) * many))
+            # Either way: a pixel that is all white so far can only become darker.
+            off = np.maximum(shown(mean + error) - shown(mean), shown(mean) - shown(mean - error)).max(axis=-1)
+        off = np.nan_to_num(off)  # of infinite radiance nothing can be told
         if self.noise is None:
             self.noise = math.sqrt(np.mean(off * off))
         cost = rays / n

@@ -155,7 +155,7 @@ class Variance(Counted, ByVariance):
     def _variance(self, pixel):
         """Of a pixel's samples."""
         n, total, squares = self.state[pixel]
-        return tuple(max(s / n - (t / n) ** 2, 0.0) * (n / (n - 1)) for s, t in zip(squares, total))
+        return tuple(max(s / n - (t / n) * (t / n), 0.0) * (n / (n - 1)) for s, t in zip(squares, total))
 
     def _worth(self, pixels):
         """How many times the samples that they have the pixels shall get."""
