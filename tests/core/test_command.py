@@ -228,7 +228,7 @@ WRONG = [
     (["trace", "--size", "100000x100000"], "100000 x 100000"),
     (["trace", "--size=-4x4"], "-4 x 4"),
     (["trace", "--size", "640"], "640x480"),
-    (["trace", "--size", "-4x4"], "--option=-1"),
+    (["trace", "--size", "-4x4"], "argument --size"),  # some Pythons take it for a value
     (["trace", "--size", "9x9", "--samples", "0"], "argument --samples: 0 does not lie between 1 and"),
     (["trace", "--size", "9x9", "--depth", "-1"], "argument --depth: -1 does not lie between 0 and"),
     (["trace", "--aa-threshold", "2"], "argument --aa-threshold: 2 does not lie between 0 and 1"),
