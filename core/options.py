@@ -33,7 +33,7 @@ PARAMETERS = (
     ),
     Parameter(
         "aa_threshold",
-        0.028,
+        0.033,
         "Adaptive antialiasing: differences in displayed values, 0 to 1, that are put up with: between corners; "
         "as the standard error of a pixel with 4 samples, (n / 4)^0.75 of it with n",
         low=0.0,

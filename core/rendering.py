@@ -164,7 +164,7 @@ class Rendering:
     aa_threshold : float
         Difference in displayed values, 0 to 1, that is put up with: between the corners; as the standard error of a
         pixel with 4 samples, (n / 4)**0.75 of it with n, so that samples go where they take most from the error; more
-        in noisy pictures (:class:`~rayscope.core.adaptive.ByVariance`). Default 0.028.
+        in noisy pictures (:class:`~rayscope.core.adaptive.ByVariance`). Default 0.033.
     aa_level : int
         Pixels between corners are divided into four so many times; by variance there are at most 4 * 4**aa_level
         samples a pixel. Default 3.

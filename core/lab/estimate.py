@@ -116,7 +116,7 @@ class Estimate:
         return self
 
 
-def estimate(scene, technique="bvh", core="fast", size=None, samples=1, depth=5, antialiasing="uniform", aa_threshold=0.028, aa_level=3,
+def estimate(scene, technique="bvh", core="fast", size=None, samples=1, depth=5, antialiasing="uniform", aa_threshold=0.033, aa_level=3,
              light_samples=1, threshold=0.0, **others):
     """Estimate a build, and with a `size` the picture too.
 

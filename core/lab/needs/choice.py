@@ -16,7 +16,7 @@ WAVE = 65_536
 #: All that is asked must be answered faster than by the standard technique by this part, as the model is not exact.
 MARGIN = 0.05
 #: And for a kind of ray it must take no more than this part: counts are foretold to a factor of two or so.
-SURE = 0.6
+SURE = 0.5
 #: What the model has no more than DOUBT times as slow as the choice may be tried while the picture is traced: so many
 #: OTHERS for a kind of ray, at most. What keeps lists for each light is not: it would have to be asked light by light.
 DOUBT, OTHERS = 4.0, 2
