@@ -15,8 +15,9 @@ from .tests import tests_of
 WAVE = 65_536
 #: All that is asked must be answered faster than by the standard technique by this part, as the model is not exact.
 MARGIN = 0.05
-#: And for a kind of ray it must take no more than this part: counts are foretold to a factor of two or so.
-SURE = 0.5
+#: And for a kind of ray it must take no more than this part: counts are foretold to a factor of two or so. Less is asked
+#: of what cannot be tried while the picture is traced, as it keeps lists for each light.
+SURE, SURE_OF_LIGHTS = 0.5, 0.6
 #: What the model has no more than DOUBT times as slow as the choice may be tried while the picture is traced: so many
 #: OTHERS for a kind of ray, at most. What keeps lists for each light is not: it would have to be asked light by light.
 DOUBT, OTHERS = 4.0, 2
@@ -83,8 +84,9 @@ def choose(seen, rays, core="fast", calls=None, tests=None):
             rows.append(row)
     standard = (STANDARD,) * len(rays)
     # Of each kind only those that would be quicker by more than the model is wrong, with no build at all.
+    sure = {name: SURE_OF_LIGHTS if model.lights else SURE for name, model in models.items()}
     serve = {
-        kind: [name for name in names if name == STANDARD or cost[name, kind] <= SURE * cost[STANDARD, kind]]
+        kind: [name for name in names if name == STANDARD or cost[name, kind] <= sure[name] * cost[STANDARD, kind]]
         for kind, names in serve.items()
     }
     best = min(itertools.product(*serve.values()), key=total) if rays else ()
