@@ -17,26 +17,23 @@ DEFAULT_SIDE = 640
 
 def whole(low, high):
     """A type of option: a whole number from low to high."""
-    def parse(text):
-        try:
-            value = int(text)
-        except ValueError:
-            raise argparse.ArgumentTypeError(f"a whole number is needed, not {text!r}") from None
-        if not low <= value <= high:
-            raise argparse.ArgumentTypeError(f"{value} does not lie between {low} and {high}")
-        return value
-    return parse
+    return _between(int, "a whole number", "d", low, high)
 
 
 def number(low, high):
     """A type of option: a number from low to high."""
+    return _between(float, "a number", "g", low, high)
+
+
+def _between(kind, needed, form, low, high):
+    """What reads a number of some kind from low to high; `form` shows these."""
     def parse(text):
         try:
-            value = float(text)
+            value = kind(text)
         except ValueError:
-            raise argparse.ArgumentTypeError(f"a number is needed, not {text!r}") from None
+            raise argparse.ArgumentTypeError(f"{needed} is needed, not {text!r}") from None
         if not low <= value <= high:                                      # nor is NaN
-            raise argparse.ArgumentTypeError(f"{text} does not lie between {low:g} and {high:g}")
+            raise argparse.ArgumentTypeError(f"{text} does not lie between {low:{form}} and {high:{form}}")
         return value
     return parse
 

@@ -298,16 +298,14 @@ class Rendering:
 
     def _build(self, wanted, index):
         """Build every different structure once."""
-        built, standard = {}, self._standard
-        if standard is not None:
-            built[STANDARD, tuple(sorted(standard.parameters.items()))] = standard
+        # What serves some kinds of ray hands others on to the standard technique: where that is wanted too, to the same.
+        plain = STANDARD, tuple(sorted(resolve(STANDARD, technique_row(STANDARD).parameters, {}, self.core).items()))
+        built = {} if self._standard is None else {plain: self._standard}
         keys = {
             kind: None if choice is None else (choice[0], tuple(sorted(choice[1].items())))
             for kind, choice in wanted.items()
         }
         todo = list(dict.fromkeys(k for k in keys.values() if k is not None and k not in built))
-        # What serves some kinds of ray hands others on to the standard technique: where that is wanted too, to the same.
-        plain = STANDARD, tuple(sorted(resolve(STANDARD, technique_row(STANDARD).parameters, {}, self.core).items()))
         todo.sort(key=lambda key: key != plain)
         for i, key in enumerate(todo):
             report = partial(self._building, done=i, of=len(todo))
